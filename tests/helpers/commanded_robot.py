@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from desk import GAZE_JOINTS
 from fakes.runs import go, simulated
 
+from gazerig.config.parameters import apply_changes
+from gazerig.config.schema import load_rig
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import CommandReply
@@ -14,6 +16,8 @@ from gazerig.robot.run.run import Run
 
 YAW = GAZE_JOINTS.index("neck_yaw")
 NECK = slice(YAW, YAW + 3)
+RATE_HZ = 50.0
+ONE_TICK_S = 1.2 / RATE_HZ
 
 
 @dataclass
@@ -29,7 +33,7 @@ class Running:
         self.count = go(self.made, seconds, self.ticks.append)
         return self.ticks[began:]
 
-    def do(self, command: Command, seconds: float = 0.006) -> tuple[CommandReply, list[Tick]]:
+    def do(self, command: Command, seconds: float = ONE_TICK_S) -> tuple[CommandReply, list[Tick]]:
         """Ask and run on; give the reply and the new ticks."""
         ticket = self.made.robot.command(command)
         ticks = self.go(seconds)
@@ -45,7 +49,8 @@ class Running:
 @contextmanager
 def running_desk() -> Iterator[Running]:
     """Run a desk rig face to face with a person, for a second as yet."""
-    made = simulated(scene="face-to-face", seed=3)
+    rig = apply_changes(load_rig("desk"), {"loop.rate_hz": RATE_HZ})
+    made = simulated(rig, scene="face-to-face", seed=3)
     made.robot.start(made.clock)
     try:
         running = Running(made)

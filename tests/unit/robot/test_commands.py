@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 import yaml
-from commanded_robot import YAW, Running
+from commanded_robot import ONE_TICK_S, RATE_HZ, YAW, Running
 from fakes.runs import go
 
 from gazerig.config.schema import load_rig
@@ -124,7 +124,7 @@ def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(
     assert {tick.guard_result.level for tick in ticks} == {"torque_off"}
     assert first.guard_result.reasons == ("all: stopped (the space bar)",)
     assert any("torque off" in event for event in first.events)
-    later = [tick.joints.position_rad for tick in ticks[20:]]
+    later = [tick.joints.position_rad for tick in ticks[5:]]
     assert max(abs(a - b) for p in later for a, b in zip(p, later[0], strict=True)) < 0.02
     # The program goes on: people can see, and resume.
     assert running.count.stopped_by == "over"
@@ -138,7 +138,7 @@ def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running):
     assert not ticks[0].stopped and all(ticks[2].joints.torque)
     start = ticks[0].guard_result.command_rad
     assert start == pytest.approx(before.joints.position_rad, abs=radians(0.5))
-    assert fastest_rad_s(ticks[:100]).max() <= GENTLE_RAD_S * 1.01
+    assert fastest_rad_s(ticks[:25]).max() <= GENTLE_RAD_S * 1.01
     assert ticks[-1].guard_result.level in ("ok", "limited")
     assert ticks[-1].target.kind == "face"
 
@@ -163,7 +163,7 @@ def test_a_stop_while_parking_is_obeyed_at_once(running: Running):
     seen: list[Tick] = []
     assert not robot.park(made.park_rad, made.clock, made.loop, watch=seen.append)
     assert [tick.stopped for tick in seen] == ["a hand"]
-    assert made.clock.now_s() - began_s < 0.011
+    assert made.clock.now_s() - began_s < 1.1 / RATE_HZ
     joints = robot.body.read(made.clock.now_s())
     assert not any(joints.torque) and degrees(joints.position_rad[YAW]) > 45.0
 
@@ -232,7 +232,7 @@ def test_another_resumes_only_who_confirms(running: Running):
         assert by in replied(running, command)
     assert running.made.robot.stopped
     ticket = running.made.robot.command(Resume(who="browser 2", confirmed=True))
-    tick = running.go(0.006)[0]
+    tick = running.go(ONE_TICK_S)[0]
     assert ticket.wait(0.0) is not None and not tick.stopped
     assert any("torque on again by browser 2" in event for event in tick.events)
 
@@ -241,9 +241,9 @@ def test_another_resumes_only_who_confirms(running: Running):
 def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool):
     running.order(Stop("a hand", who="browser 1"))
     events: list[str] = []
-    for _ in range(700):  # 3.5 s, one a tick
+    for _ in range(175):  # 3.5 s, one a tick
         running.order(Resume(who="a loop", confirmed=confirmed))
-        events += [event for tick in running.go(0.006) for event in tick.events]
+        events += [event for tick in running.go(ONE_TICK_S) for event in tick.events]
     assert running.made.robot.stopped == "a hand"
     assert len([event for event in events if "resume" in event]) < 10
 
@@ -261,7 +261,7 @@ def test_a_command_is_replied_to_when_its_tick_can_be_seen(running: Running):
         def watch(tick: Tick) -> None:
             seen.append([ticket.wait(0.0) for ticket in tickets])  # noqa: B023
 
-        go(running.made, 0.006, watch)
+        go(running.made, ONE_TICK_S, watch)
         assert seen[0] == [None] * len(tickets)
         assert None not in [ticket.wait(0.0) for ticket in tickets]
 
@@ -272,7 +272,7 @@ def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: 
         for order in (LookAt((1.0, 0.2, 0.3)), Jog((("neck_yaw", 0.2),)), Resume(confirmed=True))
     ]
     running.order(Stop("a hand"))
-    assert running.go(0.006)[0].commands == (Stop("a hand"),)
+    assert running.go(ONE_TICK_S)[0].commands == (Stop("a hand"),)
     replies = [ticket.wait(0.0) for ticket in tickets]
     assert all(reply is not None and "stopped meanwhile" in reply.refused for reply in replies)
     assert "resume first" in replied(running, LookAt((1.0, 0.2, 0.3)))
@@ -286,7 +286,7 @@ def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running):
     ticks = running.go(1.5)
     assert ticks[0].controlled_by == "a show (process 7): neck_yaw at 17.2 deg"
     led = [tick for tick in ticks if tick.controlled_by]
-    assert led[-1].t_s - led[0].t_s == pytest.approx(1.0, abs=0.011)
+    assert led[-1].t_s - led[0].t_s == pytest.approx(1.0, abs=1.1 / RATE_HZ)
     words = [event for tick in ticks for event in tick.events]
     assert "controlled by a show (process 7): neck_yaw at 17.2 deg" in words
     assert (
@@ -317,7 +317,7 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
         for _ in range(1000):
             robot.command(Ask("lids", "wink left"))
     stop = robot.command(Stop("a hand"))
-    tick = running.go(0.006)[0]
+    tick = running.go(ONE_TICK_S)[0]
     assert tick.commands[0] == Stop("a hand") and len(tick.commands) <= 9
     assert stop.wait(0.0) is not None and tick.stopped
     for _ in range(1000):
@@ -331,7 +331,7 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
 @pytest.mark.parametrize("frame", ["world", "head"])
 def test_a_direction_is_looked_in(running: Running, frame: Any):
     running.do(Jog((("neck_yaw", radians(15.0)),), stay=True), 2.0)
-    before = running.go(0.006)[-1].pose
+    before = running.go(ONE_TICK_S)[-1].pose
     asked = (radians(10.0), radians(-5.0))
     ticks = running.do(LookAtDirection(asked, frame, stay=True), 2.0)[1]
     pose, point = ticks[-1].pose, ticks[-1].gaze.gaze_point_world_m
@@ -343,7 +343,7 @@ def test_a_direction_is_looked_in(running: Running, frame: Any):
 
 
 def test_a_person_is_followed_with_the_scanpath_on_the_face(running: Running):
-    percept = running.go(0.006)[-1].percept
+    percept = running.go(ONE_TICK_S)[-1].percept
     assert percept is not None
     person = percept.faces[0].id
     reply, ticks = running.do(LookAtPerson(person, stay=True), 3.0)
@@ -358,18 +358,18 @@ def test_a_person_is_followed_with_the_scanpath_on_the_face(running: Running):
 
 def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(running: Running):
     assert running.do(LookAtPerson(99))[0].refused.startswith("no visible person '99'; available: ")
-    percept = running.go(0.006)[-1].percept
+    percept = running.go(ONE_TICK_S)[-1].percept
     assert percept is not None
     running.do(LookAtPerson(percept.faces[0].id, stay=True))
     blind: Any = lambda found, poses: None  # noqa: E731
     running.made.robot.perception.see = blind  # type: ignore[method-assign]
     ticks = running.go(2.5)
-    assert ticks[100].controlled_by and not ticks[-1].controlled_by
+    assert ticks[25].controlled_by and not ticks[-1].controlled_by
     assert ticks[-1].client_control.end_reason == f"person {percept.faces[0].id} is gone"
 
 
 def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running: Running):
-    tick = running.go(0.006)[-1]
+    tick = running.go(ONE_TICK_S)[-1]
     found = tick.detections
     assert found is not None and tick.percept is not None
     x, y, width, height = found.faces[0].box_px
@@ -390,12 +390,12 @@ def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running: Running):
 def test_a_pixel_without_a_frame_is_refused(running: Running):
     nothing: Any = lambda now_s: None  # noqa: E731
     running.made.robot.camera.latest = nothing  # type: ignore[method-assign]
-    running.go(0.006)
+    running.go(ONE_TICK_S)
     assert "no camera frame" in running.do(LookAtPixel((1.0, 1.0)))[0].refused
 
 
 def test_leads_are_counted_and_their_ends_have_reasons(running: Running):
-    assert running.go(0.006)[-1].client_control == NO_CLIENT_CONTROL
+    assert running.go(ONE_TICK_S)[-1].client_control == NO_CLIENT_CONTROL
     assert running.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].control_number == 1
     reply, ticks = running.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)
     assert (

@@ -39,7 +39,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder with an expressive rig whose sounds are silent, and three sounds."""
     folder = tmp_path_factory.mktemp("voice")
     text = SHIPPED.read_text("utf-8").replace(
-        "profile: robot", "profile: robot\nsound: {device: silent}"
+        "profile: robot", "profile: robot\nsound: {device: silent}\nloop: {rate_hz: 50}"
     )
     show = "description: x\nsound: long.wav\nframes: [{time_s: 50, head_yaw_deg: 3}]\n"
     (folder / "show.yaml").write_text(show, "utf-8")
@@ -69,7 +69,9 @@ class Ticks:
 
 
 def opened(folder: Path, ticks: Ticks | None = None, **given: Any) -> Any:
-    head: Any = gazerig.open(str(folder / "rig.yaml"), mock=True, say=lambda line: None, **given)
+    head: Any = gazerig.open(
+        str(folder / "rig.yaml"), mock=True, bus="ideal", say=lambda line: None, **given
+    )
     if ticks is not None:
         update = head._feed.update
 
@@ -219,7 +221,7 @@ def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(
 def test_a_stream_without_volume_moves_the_mouth_and_needs_no_loudspeaker(folder: Path):
     text, rig = (folder / "rig.yaml").read_text("utf-8"), folder / "elsewhere.yaml"
     rig.write_text(text.replace("device: silent", "device: none such"), "utf-8")
-    with gazerig.open(str(rig), mock=True, say=lambda line: None) as head:
+    with gazerig.open(str(rig), mock=True, bus="ideal", say=lambda line: None) as head:
         pieces = [speech(0.5)[i : i + 1280] for i in range(0, 16000, 1280)]
         with pytest.raises(Refused, match="none such"):
             head.say(pieces, rate_hz=RATE)
