@@ -87,9 +87,10 @@ _REMEMBER_PERSON_S = 300.0
 """A person who returns within this time keeps the number, if position, height and clothes match."""
 # At a cut of a film on a screen a face is suddenly elsewhere: farther from its expected position
 # than a distance, and than a speed allows, in about two frames. From the second cut within this
-# angle and time on, faces that appear or jump there are in a film.
+# angle and time on, faces that appear or jump there are in a film. Jumps within a shorter time are
+# of one cut, or of one fast turn of the camera, in which a face at the edge is measured badly.
 _JUMP_M, _JUMP_M_S = 0.1, 2.0
-_FILM_RAD, _FILM_S, _JUMPS = radians(12.0), 30.0, 4
+_FILM_RAD, _FILM_S, _JUMPS, _CUT_S = radians(12.0), 30.0, 4, 0.5
 # Time after which a person who is out of sight may be one in view whose clothes are known.
 _LOST_S = 0.8
 # A person in fewer frames than this may be a false detection, which is not remembered. Number of
@@ -207,7 +208,7 @@ class Tracker:
             for view, at_s in self._jumps
             if track.at_s - at_s < _FILM_S and angle_between(view, track.filter.view) < _FILM_RAD
         ]
-        if len(near) >= _JUMPS:
+        if len(near) >= _JUMPS and near[-1] - near[0] > _CUT_S:
             track.filmed_s = track.at_s
 
     def _number(self, track: BodyTrack) -> None:

@@ -192,6 +192,14 @@ def test_a_face_that_jumps_again_and_again_is_in_a_film():
     assert found.bodies.lifeless == found.bodies.ids[:1]
 
 
+def test_a_face_that_is_measured_badly_for_a_moment_is_in_no_film():
+    perception = Perception(STILL, 69.0)
+    for k in range(1, 60):
+        x = 0.15 * (k % 2) if 30 <= k < 36 else 0.02 * sin(0.2 * k)
+        found = seen(perception, k, faces=(face_at((x, 0.0, 2.0)),))
+    assert found.bodies.lifeless == ()
+
+
 def test_a_face_before_a_wall_lives_and_one_in_its_plane_does_not():
     for face_m, lifeless in ((2.0, ()), (2.98, (1,))):
         perception = Perception(STILL, 69.0)
