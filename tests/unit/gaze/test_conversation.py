@@ -104,9 +104,9 @@ def test_a_turn_is_thought_spoken_and_interrupted_with_the_gaze(running: Running
     running.do(Talk("listening", stay=True), 2.0)
     running.do(Talk("thinking", stay=True))
     assert wait_for(running, "away", 0.3) < 0.05
-    running.do(Talk("speaking", seconds=8.0, stay=True), 0.5)
+    running.do(Talk("speaking", seconds=5.0, stay=True), 0.5)
     assert running.ticks[-1].target.kind == "away"  # the look of thinking continues
-    late = [tick for tick in running.go(9.0) if tick.t_s > running.ticks[-1].t_s - 2.0]
+    late = [tick for tick in running.go(6.0) if tick.t_s > running.ticks[-1].t_s - 2.0]
     assert {tick.target.kind for tick in late} == {"face"}  # the end, and the time after it
     running.do(Talk("thinking", stay=True), 0.5)
     assert running.ticks[-1].target.kind == "away"

@@ -14,6 +14,7 @@ from gazerig.gaze.types import Bodies, Percept, Target, Vec3
 
 EYE: Vec3 = (0.0, 0.0, 0.0)
 PARAMS = HabituationParams()
+RATE_HZ = 15
 
 
 def bodies(kinds: str, *places: Vec3, speed: float = 0.0) -> Bodies:
@@ -39,10 +40,10 @@ def watch(
     later: Bodies | None = None,
     habituation: HabituationParams | Literal["none"] = PARAMS,
 ) -> list[Target]:
-    """Let attention look at a scene that stays as it is, 30 pictures a second."""
+    """Let attention look at a scene that stays as it is."""
     model = attention(habituation=habituation)
     scenes = [seen, later] if later is not None else [seen]
-    times = [k / 30 for k in range(round(30 * seconds * len(scenes)))]
+    times = [k / RATE_HZ for k in range(round(RATE_HZ * seconds * len(scenes)))]
     return [model.choose(Percept(t, scenes[int(t / seconds)]), looking(), t) for t in times]
 
 
@@ -50,7 +51,7 @@ def waits_s(targets: list[Target], n: int) -> list[float]:
     """Return for how long each of n bodies was not looked at, at most."""
     ids = np.array([target.id for target in targets])
     on = [np.flatnonzero(np.concatenate(([True], ids == k, [True]))) for k in range(1, n + 1)]
-    return [float(np.diff(one).max()) / 30 for one in on]
+    return [float(np.diff(one).max()) / RATE_HZ for one in on]
 
 
 def shares(targets: list[Target]) -> dict[int, float]:
@@ -60,7 +61,7 @@ def shares(targets: list[Target]) -> dict[int, float]:
 
 def stays_s(targets: list[Target]) -> list[float]:
     """Return how long each look lasted, without the last one, which the end cuts short."""
-    return [len(list(same)) / 30 for _, same in groupby(t.id for t in targets)][:-1]
+    return [len(list(same)) / RATE_HZ for _, same in groupby(t.id for t in targets)][:-1]
 
 
 def interest(model: Habituation, seen: Bodies, attended: int, t_s: float) -> list[float]:
@@ -133,7 +134,7 @@ def test_nobody_of_many_waits_for_long_and_no_look_is_a_glance(n: int):
 
 
 def sharing() -> Habituation:
-    return Habituation(HabituationParams(), NO_STAYS)
+    return Habituation(PARAMS, NO_STAYS)
 
 
 def test_surpluses_grow_with_the_looks_and_are_those_over_the_one_looked_at_least():

@@ -296,7 +296,7 @@ def test_e75_a_roll_does_not_swing_when_the_head_is_called_elsewhere(seed: int):
     rng, angles = np.random.default_rng(seed), (0.0, 0.0, 0.0)
     facing, name = (0.0, 0.0), 0
     head, rolls = model(), []
-    for k in range(6000):
+    for k in range(4000):
         if k % 60 == 0 and rng.random() < 0.4:
             facing, name = (radians(float(rng.uniform(-70.0, 70.0))), 0.0), k
         seen = target(id=name, salience=1.0, shift=name)
@@ -394,7 +394,7 @@ def test_the_head_goes_on_with_a_walker_during_a_look_away():
 
 
 def test_recentring_is_random_and_slow():
-    place = np.full(round(8.0 / DT), 15.0)
+    place = np.full(round(5.0 / DT), 15.0)
     starts, ends = [], []
     for seed in range(30):
         yaws = follow(small_head(seed), place, "thing")

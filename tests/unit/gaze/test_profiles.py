@@ -111,22 +111,14 @@ def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> 
     return Trace(named, frozenset(kinds))
 
 
-def as_told(claim: Claim) -> list[str]:
-    """Return the profiles of which a row of the page is not true."""
-    return [
-        profile
-        for profile, cell in zip(PROFILES, claim.cells, strict=True)
-        if cell != ("runs" if ran(profile).calls[claim.name] else "-")
-    ]
-
-
 CLAIMS = list(claims())
 """Nothing here is asked of single ticks."""
 
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.name)
-def test_e68_what_the_page_says_runs_where_it_says(claim: object):
-    assert as_told(claim) == []  # type: ignore[arg-type]
+def test_e68_what_the_page_says_runs_where_it_says(claim: Claim):
+    for profile, cell in zip(PROFILES, claim.cells, strict=True):
+        assert cell == ("runs" if ran(profile).calls[claim.name] else "-"), profile
 
 
 def test_every_row_of_the_page_is_read():
@@ -142,9 +134,9 @@ def test_every_row_of_the_page_is_read():
      ("random", "RandomAngles.step")],
 )  # fmt: skip
 def test_e68_the_baselines_of_the_paper_run_in_its_profile(scanpath: str, function: str):
-    calls = ran("nakamoto", scanpath, 6.0).calls
-    assert calls[function] > 200 and calls["MarkovWalk.step"] == 0
-    assert calls["OppositeAngles.fixate"] > 200
+    calls = ran("nakamoto", scanpath, 3.0).calls
+    assert calls[function] > 100 and calls["MarkovWalk.step"] == 0
+    assert calls["OppositeAngles.fixate"] > 100
 
 
 def test_e68_each_profile_looks_at_what_its_paper_has():
@@ -176,7 +168,7 @@ def test_e68_nakamoto_turns_the_head_beyond_20_deg_only(nakamoto: MeasuredRun):
 
 
 def test_e68_mitake_never_blinks_nor_leaves_a_face_that_stands():
-    run = half_rate_run("face-to-face", "mitake", seconds=10.0)
+    run = half_rate_run("face-to-face", "mitake", seconds=6.0)
     assert not run.blink.any() and np.ptp(run.lids_goal) == 0.0
     assert set(run.part) <= {"N", ""} and (run.part == "N").mean() > 0.8
     assert not any("away" in name for name in run.target_name)
@@ -193,7 +185,9 @@ class Aside(EmptyScene):
 
 @pytest.mark.parametrize(("salience", "short"), [(0.4, 29.121), (0.6, 15.0), (0.8, 0.879)])
 def test_e12_offset_values_of_the_running_head(salience: float, short: float):
-    rules = {"gaze.top_down.rules.wait.salience": salience}
+    rules = {
+        "gaze.top_down.rules.wait.salience": salience, "loop.rate_hz": 50.0
+    }  # fmt: skip
     run = measured_run(Aside(), "mitake", seconds=4.0, overrides=rules, bus="ideal")
     yaw, pitch = np.radians(run.head_goal_deg[-1, :2])
     rest = angle_between(direction((yaw, pitch)), direction((radians(30.0), 0.0)))

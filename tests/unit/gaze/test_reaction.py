@@ -34,19 +34,23 @@ class Viewer:
         self._t_s = 0.0
         self._shown: list[tuple[float, list[Any]]] = []
 
-    def show(self, rows: list[Any], for_s: float) -> list[tuple[float, str, int]]:
+    def show(
+        self, rows: list[Any], for_s: float, tick_s: float = TICK_S
+    ) -> list[tuple[float, str, int]]:
         """Show bodies; return what is looked at, tick by tick: time since, kind and id."""
-        return list(self._looks(rows, for_s))
+        return list(self._looks(rows, for_s, tick_s))
 
-    def _looks(self, rows: list[Any], for_s: float) -> Iterator[tuple[float, str, int]]:
+    def _looks(
+        self, rows: list[Any], for_s: float, tick_s: float = TICK_S
+    ) -> Iterator[tuple[float, str, int]]:
         start_s = self._t_s
         self._shown.append((start_s, rows))
-        for k in range(round(for_s / TICK_S)):
-            t_s = start_s + k * TICK_S
+        for k in range(round(for_s / tick_s)):
+            t_s = start_s + k * tick_s
             exposed_s = int((t_s - DELAY_S) / FRAME_S + 1e-9) * FRAME_S
             target = self.model.choose(self._percept(exposed_s), looking(), t_s)
-            yield k * TICK_S, target.kind, target.id
-        self._t_s = start_s + round(for_s / TICK_S) * TICK_S
+            yield k * tick_s, target.kind, target.id
+        self._t_s = start_s + round(for_s / tick_s) * tick_s
 
     def _percept(self, exposed_s: float) -> Percept | None:
         before = [rows for since_s, rows in self._shown if since_s <= exposed_s + 1e-9]
@@ -62,7 +66,7 @@ def reactions(nearer: bool, count: int) -> Floats:
     times = []
     for seed in range(count):
         viewer = Viewer(attention(np.random.default_rng(seed)))
-        viewer.show([FACE], 2.5)
+        viewer.show([FACE], 2.5, FRAME_S)
         times.append(viewer.reaction_s([FACE, NEARS if nearer else REACHES], "hand"))
     return np.array(times)
 

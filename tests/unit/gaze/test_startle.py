@@ -26,7 +26,9 @@ class Balls(EmptyScene):
 
 
 def test_a_ball_at_the_face_shuts_the_lids_in_time_and_draws_the_head_back():
-    quiet = {"gaze.lids.blinks_per_min": 0.0, "gaze.idle.explores": False}
+    quiet = {
+        "gaze.lids.blinks_per_min": 0.0, "gaze.idle.explores": False, "loop.rate_hz": 100.0
+    }  # fmt: skip
     run = measured_run(Balls(), seed=101, seconds=21.0, bus="ideal", overrides=quiet)
     for number, (m_s, *_) in enumerate(BALLS):
         since_s = run.t_s - FIRST_S - EVERY_S * number

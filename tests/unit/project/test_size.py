@@ -41,12 +41,15 @@ def code_tokens(text: str) -> int:
     """
     count = depth = 0
     for token in TOKEN.finditer(text):
-        if token.lastgroup == "comment":
+        kind, word = token.lastgroup, token[0]
+        if kind is None:
+            depth += (word in OPENING) - (word in CLOSING)
+        elif kind == "comment":
             continue
-        word = token[0]
-        depth += (word in OPENING) - (word in CLOSING)
-        line = text[text.rfind("\n", 0, token.start()) + 1 : token.start()]
-        count += not (token.lastgroup == "string" and depth == 0 and not line.strip())
+        elif depth == 0:
+            line = text[text.rfind("\n", 0, token.start()) + 1 : token.start()]
+            count -= not line.strip()
+        count += 1
     return count
 
 
