@@ -1,9 +1,11 @@
 """Shipped rigs at another rate of their control loop, for tests that do not judge the rate."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from gazerig.config.load import shipped_path
+from gazerig.config.schema import Rig
 
 _RATE = re.compile(r"^loop:.*\n  rate_hz: [\d.]+", re.MULTILINE)
 
@@ -20,3 +22,7 @@ def at_rate(folder: Path, rig: str, rate_hz: float) -> str:
     file = folder / f"{source.stem}.yaml"
     file.write_text(text, encoding="utf-8")
     return str(file)
+
+
+def slowed(rig: Rig, rate_hz: float) -> Rig:
+    return replace(rig, loop=replace(rig.loop, rate_hz=rate_hz))

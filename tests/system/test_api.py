@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from slow_rigs import at_rate
 
 import gazerig
-from gazerig.config.load import shipped_path
 from gazerig.gaze.types import GazeState, Percept, Vec3
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.run.rerun import rerun
@@ -150,13 +150,12 @@ def test_states_events_and_conditions_step_the_head(head: gazerig.SimulatedHead)
 
 def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path):
     """Also with tracks whose files come, change and go meanwhile."""
-    tracks, rig = tmp_path / "tracks", tmp_path / "my.yaml"
+    tracks, rig = tmp_path / "tracks", at_rate(tmp_path, "desk", 50.0)
     tracks.mkdir()
-    rig.write_text(shipped_path("rigs", "desk").read_text("utf-8"))
     file = tmp_path / "program.mcap"
     bow = "description: x\nframes: [{{time_s: 0.5, head_pitch_deg: {}}}]\n"
     options: dict[str, Any] = {"bus": "emulated", "scene": "face-to-face", "record": file}
-    with gazerig.open(str(rig), fast=True, **options) as head:
+    with gazerig.open(rig, fast=True, **options) as head:
         head.step(1.0)
         head.look_at_pixel(200.0, 150.0).wait()
         head.play("nod")

@@ -1,6 +1,5 @@
 """The papers' scenes through the whole robot."""
 
-from dataclasses import replace
 from math import degrees, dist, inf, pi, sin
 from statistics import median
 from typing import NamedTuple
@@ -8,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from fakes.runs import play
+from slow_rigs import slowed
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.types import Target, Vec3
@@ -77,9 +77,9 @@ def _is_on(event: Event, target: Target) -> bool:
 
 
 def made_for(scene: str) -> Run:
-    rig = load_rig("desk")
-    rig = replace(rig, loop=replace(rig.loop, rate_hz=RATE_HZ))
-    return Run(rig, RunOptions(mock=True, fast=True, seed=0, scene=scene))
+    return Run(
+        slowed(load_rig("desk"), RATE_HZ), RunOptions(mock=True, fast=True, seed=0, scene=scene)
+    )
 
 
 @pytest.fixture(scope="module")

@@ -1,6 +1,5 @@
 """The maker's eyes and a rig of three kinds of bus, alive in simulated time."""
 
-from dataclasses import replace
 from math import radians
 from pathlib import Path
 
@@ -8,6 +7,7 @@ import numpy as np
 import pytest
 from fakes.runs import go, simulated
 from mixed_rig import rig_of
+from slow_rigs import slowed
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.loop.tick import Tick
@@ -18,7 +18,7 @@ Ran = tuple[Run, list[Tick], tuple[str, ...]]
 
 def ran(rig: Rig, seconds: float) -> Ran:
     """Run a rig before a visitor; return the run, every tick, and the messages at the start."""
-    made = simulated(replace(rig, loop=replace(rig.loop, rate_hz=100.0)))
+    made = simulated(slowed(rig, 100.0))
     ticks: list[Tick] = []
     made.robot.start(made.clock)
     said = made.robot.body.bus.events()

@@ -47,7 +47,7 @@ def test_e59_before_a_photo_same_seed_same_bytes_in_another_process(tmp_path: Pa
     data = pytest.importorskip("skimage.data", reason="scikit-image ships the photo")
     photo = str(tmp_path / "photo.png")
     cv2.imwrite(photo, np.ascontiguousarray(data.astronaut()[:, :, ::-1]))
-    rig = at_rate(tmp_path, "desk", 100.0)
+    rig = at_rate(tmp_path, "desk", 50.0)
     words = (rig, "--video", photo, "--seconds", "1", "--seed")
     recording = tmp_path / "run.mcap"
     record = ("--record", str(recording), "--summary", "-")

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fakes.runs import ticks
+from slow_rigs import slowed
 
 from gazerig.config.schema import Rig, load_rig
 from gazerig.robot.loop.tick import Tick
@@ -18,13 +19,13 @@ from gazerig.robot.run.run import Run
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
-DT = 0.005
+DT = 0.01
 POINT = (1.0, 0.0, 0.25)
 
 
 def steady(name: str) -> Rig:
     """Return a rig without drift, recentring, and eye turns of blinks."""
-    rig = load_rig(name)
+    rig = slowed(load_rig(name), 1.0 / DT)
     gaze = rig.gaze
     gaze = replace(
         gaze,
@@ -38,10 +39,10 @@ def steady(name: str) -> Rig:
 def played(made: Run, track: str) -> tuple[CommandReply, list[Tick]]:
     """Play a track and go on until shortly after its end."""
     ticket = made.robot.command(Play(track))
-    first = ticks(made, 1)
+    first = ticks(made, 1, DT)
     reply = ticket.wait(0.0)
     assert reply is not None and reply.track is not None, reply
-    return reply, first + ticks(made, int(reply.track.duration_s / DT) + 60)
+    return reply, first + ticks(made, int(reply.track.duration_s / DT) + 30, DT)
 
 
 def test_joints_follow_tracks_and_the_eyes_stay_on_the_point(started: Callable[[Rig], Run]):
@@ -50,7 +51,7 @@ def test_joints_follow_tracks_and_the_eyes_stay_on_the_point(started: Callable[[
         made = started(rig)
         lids = np.array([joint.endswith("lid") for joint in rig.names])
         made.robot.command(LookAt(POINT, who="test", stay=True))
-        before = ticks(made, 400)[-1]
+        before = ticks(made, 200, DT)[-1]
         for track in tracks:
             _, done = played(made, track)
             desired = np.array([tick.desired_rad for tick in done])
@@ -87,7 +88,7 @@ def test_what_a_track_owns_is_its_alone_and_gaze_keeps_the_eyes_on_the_point(
     rig = replace(steady("expressive"), track_files=(str(file),))
     made = started(rig)
     made.robot.command(LookAt(POINT, stay=True))
-    ticks(made, 300)
+    ticks(made, 150, DT)
     _, found = played(made, "own")
     yaw, jaw = rig.names.index("neck_yaw"), rig.names.index("jaw")
     at_s = [tick.t_s - found[0].t_s for tick in found]
@@ -105,11 +106,11 @@ def test_what_a_track_owns_is_its_alone_and_gaze_keeps_the_eyes_on_the_point(
         "  - {time_s: 1, eyes_yaw_deg: 10, lids: {all: 0.4}}\n"
         "  - {time_s: 3, eyes_yaw_deg: 10, lids: {all: 0.4}}\n  - {time_s: 4, eyes_yaw_deg: 0}\n"
     )
-    desk = replace(load_rig("desk"), track_files=(str(file),))
+    desk = replace(slowed(load_rig("desk"), 1.0 / DT), track_files=(str(file),))
     made = started(desk)
-    ticks(made, 300)
+    ticks(made, 150, DT)
     _, found = played(made, "stare")
-    held = found[240:580]  # saccades and blinks of gaze do not move them
+    held = found[120:290]  # saccades and blinks of gaze do not move them
     for eye in (0, 1):
         pans = [(tick.gaze.eye_left_rad, tick.gaze.eye_right_rad)[eye][0] for tick in held]
         assert np.degrees(pans) == pytest.approx(10.0, abs=1e-6)

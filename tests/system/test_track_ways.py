@@ -1,9 +1,9 @@
 """Tracks from the command line, from Python, on the page, from menus and by rules."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import pytest
+from slow_rigs import slowed
 from ticked_rig import TickedRig, connected, gazerig
 
 from gazerig.config.schema import load_rig
@@ -56,7 +56,7 @@ def test_a_visitor_who_waves_is_nodded_to():
     )
     said: list[str] = []
     rig = load_rig("desk")
-    rig = replace(rig, loop=replace(rig.loop, rate_hz=50.0))
+    rig = slowed(rig, 50.0)
     session.Session(Run(rig, options), lambda: None, said.append).run()
     (nod,) = [line for line in said if "track" in line]
     at_s = float(nod.split(" s: ")[0])

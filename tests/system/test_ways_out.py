@@ -8,6 +8,7 @@ import pytest
 from attack.ways_out import case, side_by_side
 from branch import Branch, gazerig
 from features_there import is_there
+from slow_rigs import slowed
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.plugins import COMMAND, SHIPPED
@@ -35,7 +36,7 @@ def ran(
     before: Callable[[Run], None] | None = None,
 ) -> dict[str, Any]:
     options = RunOptions(True, True, rig=rig, seconds=seconds).check_and_complete()
-    made = Run(load_rig(rig), options)
+    made = Run(slowed(load_rig(rig), 50.0), options)
     if before is not None:
         before(made)
     return session.Session(made, lambda: None, said.append).run()
@@ -48,7 +49,7 @@ def test_no_memory_in_the_loop_leaves_by_the_door(
 
     def short_of_memory(self: Robot, *words: Any) -> object:
         ticks.append(on(devices[-1]))
-        if len(ticks) > 100:
+        if len(ticks) > 50:
             raise MemoryError
         return tick(self, *words)
 
@@ -71,7 +72,7 @@ def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
     monkeypatch.setattr(JointFaults, "update", broken)
     said: list[str] = []
     figures = ran("desk", said, 1.0)
-    assert figures["stopped_by"] == "seconds" and figures["ticks"] >= 199 and on(devices[0]) == 0
+    assert figures["stopped_by"] == "seconds" and figures["ticks"] >= 49 and on(devices[0]) == 0
     assert [line for line in said if "plug-in" in line] == [
         "the watch for faults failed (RuntimeError: plug-in); the rig continues without it"
     ]

@@ -36,27 +36,27 @@ class Unseen:
         return ()
 
 
-class Remembered:
-    """Finds the faces of a picture once; the detector keeps nothing from one to the next."""
-
-    def __init__(self) -> None:
-        self._detector, self._found = MtcnnDetector(FaceDetectorParams()), dict[bytes, Any]()
-
-    def find(self, image: np.ndarray) -> Any:
-        key = image.tobytes()
-        if key not in self._found:
-            self._found[key] = self._detector.find(image)
-        return self._found[key]
+_find, _found = MtcnnDetector.find, dict[object, Any]()
 
 
-remembered = cache(Remembered)
+@pytest.fixture(autouse=True)
+def pictures_are_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Remember faces: the detector keeps nothing from one picture to the next."""
+
+    def find(self: MtcnnDetector, image: np.ndarray) -> Any:
+        key = image.shape, image.tobytes()
+        if key not in _found:
+            _found[key] = _find(self, image)
+        return _found[key]
+
+    monkeypatch.setattr(MtcnnDetector, "find", find)
 
 
 def looked(
     images: list[np.ndarray], detector: Any = None, **how: Any
 ) -> tuple[list[tuple[float, str]], Detections]:
     """Return the reports on frames with their times, and the last detections."""
-    analyzer = FrameAnalyzer(detector or remembered(), **how)
+    analyzer = FrameAnalyzer(detector or MtcnnDetector(FaceDetectorParams()), **how)
     told: list[tuple[float, str]] = []
     for k, image in enumerate(images):
         found = analyzer.analyze(Shot(PERIOD_S * k, k + 1, image))

@@ -14,6 +14,7 @@ import pytest
 from command_line import invoked
 from fakes.runs import play, simulated
 from msgspec import structs
+from slow_rigs import slowed
 
 from gazerig.config.schema import Rig, load_walk
 from gazerig.features.lab.analysis import human_norms as human
@@ -76,8 +77,7 @@ def gathered(ticks: list[Tick]) -> GazeTrace:
 @pytest.fixture(scope="module")
 def walking(desk_rig: Rig) -> GazeTrace:
     """A minute of gaze with half the ticks: it takes longest here."""
-    slower = replace(desk_rig, loop=replace(desk_rig.loop, rate_hz=100.0))
-    return gathered(run_ticks(slower, 60.0))
+    return gathered(run_ticks(slowed(desk_rig, 100.0), 60.0))
 
 
 @pytest.fixture(scope="module")

@@ -70,7 +70,7 @@ def test_limbs_keep_their_lengths(name: str):
             for (a, b), length in lengths.items():
                 ends = [places(name, f"{who}/{side}_{part}") for part in (a, b)]
                 found = np.linalg.norm(ends[0] - ends[1], axis=1)
-                assert found == pytest.approx(np.full(len(found), length), abs=2e-3)
+                assert np.abs(found - length).max() <= 2e-3, (who, side, a)
 
 
 @pytest.mark.parametrize("name", WORLDS)
@@ -224,17 +224,17 @@ def test_people_stay_out_of_the_furniture_and_of_each_other(mujoco: Any, name: s
     from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.model import world_spec
 
-    figures = Figures(shipped_world(name), 1)
-    model = world_spec(figures, None).compile()
+    world = figures(name)
+    model = world_spec(world, None).compile()
     data = mujoco.MjData(model)
-    people = PeoplePlacer(model, figures)
+    people = PeoplePlacer(model, world)
     owners = [owner(model, i) for i in range(model.ngeom)]
     solid = [i for i in range(model.ngeom) if model.geom_contype[i] and "/" in owners[i]]
     room = [i for i in range(model.ngeom) if owners[i] in ("room", "stand")]
     whose = np.array([one.split("/")[0] for one in owners])
     bound = model.geom_rbound
-    half_m = 3.4 if figures.script.room == "hall" else 2.6
-    for t_s in np.arange(0.3, figures.script.round_s, 1.31).tolist():
+    half_m = 3.4 if world.script.room == "hall" else 2.6
+    for t_s in np.arange(0.3, world.script.round_s, 1.31).tolist():
         people.place(data, t_s)
         mujoco.mj_kinematics(model, data)
         seen = [i for i in solid if abs(data.geom_xpos[i, 1]) < half_m]

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from fakes.runs import record
 from present import present
+from slow_rigs import slowed
 
 from gazerig.config.schema import load_rig
 from gazerig.features.world.gl_context import NoRenderer
@@ -36,7 +37,7 @@ FAST = RunOptions(
 
 
 def test_a_head_in_a_world_finds_the_person_there():
-    made = simulate(load_rig("desk"), replace(FAST, seconds=5.0))
+    made = simulate(slowed(load_rig("desk"), 50.0), replace(FAST, seconds=5.0))
     assert int(str(made.figures["faces_seen"])) > 100
     off_deg = made.trace.column("off").mean(axis=1)
     assert np.median(off_deg[made.trace.slow()]) < 1.0
@@ -166,8 +167,7 @@ def test_the_recording_of_a_moved_opponent_repeats_to_the_bit(tmp_path: Path):
             made.robot.command(MoveOpponent(p_m))
 
     options = replace(BOXING, character="strong_boxer")
-    rig = with_options(load_rig("desk", "strong_boxer"), options)
-    rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
+    rig = slowed(with_options(load_rig("desk", "strong_boxer"), options), 100.0)
     ticks: list[Tick] = record(tmp_path / "run.mcap", rig, 3.0, options, order)
     assert any(tick.target.plan.startswith("guard") for tick in ticks)
     ordered = [one for tick in ticks for one in tick.commands]
