@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from desk import GAZE_JOINTS
 from fakes.runs import go, simulated
 
-from gazerig.config.parameters import apply_changes
-from gazerig.config.schema import load_rig
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import Command
 from gazerig.robot.model.reply import CommandReply
@@ -49,8 +47,7 @@ class Running:
 @contextmanager
 def running_desk() -> Iterator[Running]:
     """Run a desk rig face to face with a person, for a second as yet."""
-    rig = apply_changes(load_rig("desk"), {"loop.rate_hz": RATE_HZ})
-    made = simulated(rig, scene="face-to-face", seed=3)
+    made = simulated(scene="face-to-face", seed=3, rate=RATE_HZ)
     made.robot.start(made.clock)
     try:
         running = Running(made)

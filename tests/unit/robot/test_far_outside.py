@@ -48,6 +48,7 @@ class FarBench(Bench):
     def __init__(self, rig: Rig, recover: bool = False) -> None:
         self.said = list[str]()
         super().__init__(rig, recover=self.said.append if recover else None)
+        self.shafts.looking = False
 
     def angle_deg(self) -> float:
         """Return where the eye truly is."""
@@ -156,7 +157,19 @@ def test_a_servo_without_a_position_is_not_taken_for_one_inside():
 @pytest.mark.parametrize("bus", ["ideal", "emulated"])
 @pytest.mark.usefixtures("slipped")
 def test_the_command_is_refused_in_one_line_and_recovers_on_request(bus: str, capfd: Terminal):
-    words = ("run", "desk", "--mock", "--fast", "--bus", bus, "--no-page", "--seconds", "6")
+    words = (
+        "run",
+        "desk",
+        "--mock",
+        "--fast",
+        "--bus",
+        bus,
+        "--no-page",
+        "--seconds",
+        "6",
+        "--rate",
+        "50",
+    )
     assert typed(*words) == 2
     (line,) = capfd.readouterr().err.splitlines()
     assert line.startswith(SAID) and "gazerig doctor desk --mock" in line

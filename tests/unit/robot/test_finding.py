@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
+from slow_rigs import at_rate
 
 import gazerig
 from gazerig.gaze.attention.finding import Sought
@@ -13,7 +14,8 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
 def test_a_person_is_found_where_it_is_wanted_or_nobody_in_time(tmp_path: Path):
-    with gazerig.open("desk", fast=True, scene="face-to-face", bus="ideal") as head:
+    rig = at_rate(tmp_path, "desk", 50.0)
+    with gazerig.open(rig, fast=True, scene="face-to-face", bus="ideal") as head:
         head.step(1.0)
         wanted: dict[Sought, tuple[float, float]] = {
             "left": (-0.1, 0.6), "right": (-0.6, 0.1), 99: (-0.4, 0.4),
@@ -36,6 +38,6 @@ def test_a_person_is_found_where_it_is_wanted_or_nobody_in_time(tmp_path: Path):
         with pytest.raises(gazerig.Refused, match="the scene is not drawn"):
             head.picture()
     cv2.imwrite(str(tmp_path / "grey.png"), np.full((48, 64, 3), 90, np.uint8))
-    with gazerig.open("desk", fast=True, video=tmp_path / "grey.png", bus="ideal") as head:
+    with gazerig.open(rig, fast=True, video=tmp_path / "grey.png", bus="ideal") as head:
         head.step(0.5)
         assert head.picture().startswith(b"\xff\xd8")  # as a JPEG does

@@ -5,6 +5,7 @@ from typing import get_args
 
 import pytest
 from commanded_robot import running_desk
+from slow_rigs import at_rate
 
 import gazerig
 from gazerig.robot.loop.events import EventKind, TickFeed
@@ -49,7 +50,7 @@ def test_every_saccade_blink_and_track_of_the_ticks_is_an_event():
 
 def test_people_arrive_and_leave_once(tmp_path: Path):
     (scene := tmp_path / "quick.yaml").write_text(SCENE)
-    with gazerig.open("desk", fast=True, scene=str(scene)) as head:
+    with gazerig.open(at_rate(tmp_path, "desk", 50.0), fast=True, scene=str(scene)) as head:
         head.step(9.0)
         events = list(head.events(0.0, kinds=("person_arrived", "person_left", "target")))
         texts = [event.text for event in head.events(0.0)]

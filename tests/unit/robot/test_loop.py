@@ -83,7 +83,7 @@ def test_a_servo_fault_ends_the_loop_with_its_cause():
 
 
 def test_parking_reaches_the_pose_and_torque_goes_off(monkeypatch: pytest.MonkeyPatch):
-    assembly = simulated()
+    assembly = simulated(rate=100.0)
     ticks(assembly, 4.0)
     assert assembly.robot.park(assembly.park_rad, assembly.clock, assembly.loop)
     bus: Any = assembly.robot.body.bus

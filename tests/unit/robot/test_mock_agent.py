@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from slow_rigs import at_rate
 
 import gazerig
 from gazerig.config.faults import ConfigError
@@ -43,7 +44,9 @@ agent:
 def test_an_agent_reports_the_turns_of_its_script_round_after_round(tmp_path: Path):
     (path := tmp_path / "quick.yaml").write_text(SCENE)
     acts = load_scene(str(path)).agent
-    with gazerig.open("desk", fast=True, bus="ideal", scene=str(path)) as head:
+    with gazerig.open(
+        at_rate(tmp_path, "desk", 50.0), fast=True, bus="ideal", scene=str(path)
+    ) as head:
         found = turns(head, 4.0 + acts[0].at_s + 1.5)
     names = {"interrupt": "interrupted"}
     expected = [(act.at_s, names.get(act.state, act.state)) for act in acts]

@@ -36,7 +36,7 @@ def example(tmp_path):
 def test_a_rig_on_it_looks_at_people(example):
     made = simulated(str(HEAD))
     made.robot.start(made.clock)
-    seen = ticks(made, 399, 0.025)
+    seen = ticks(made, 200, 0.025)
     made.robot.stop()
     made.close()
     assert "face" in {tick.target.kind for tick in seen}

@@ -16,9 +16,9 @@ from branch import Branch
 from loop_deaths import PATIENCE_S, Driven, rig_of
 from outside_bus import HEAD, install_example
 from outside_package import install, on_path
+from slow_rigs import at_rate
 
 import gazerig
-from gazerig.config.load import shipped_path
 from gazerig.config.parameters import apply_changes
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
@@ -113,7 +113,7 @@ def test_another_part_that_raises_ends_the_run(part: str, monkeypatch: pytest.Mo
     rig, options, label = load_rig("desk"), dict[str, Any](scene="visitor"), "odd 1.2"
     match part:
         case "camera":
-            options = {"camera": "odd", "fast": False, "scene": None}
+            options = {"camera": "odd", "fast": False, "scene": None, "rate": 50.0}
         case "detector":
             rig, options["pixels"] = apply_changes(rig, {"detector.kind": "odd"}), True
         case "bus":
@@ -150,9 +150,9 @@ class Hanging:
 
     def choose(self, *_: object) -> Any:
         self.ticks += 1
-        if self.ticks == 50:
+        if self.ticks == 10:
             print("moving", flush=True)
-        if self.ticks > 100:
+        if self.ticks > 25:
             wait()
 
 
@@ -161,8 +161,8 @@ def _hang(path: str, file: str) -> None:
         time.sleep(2.0 * PATIENCE_S)
 
 
-def test_a_rule_that_hangs_leaves_limp_servos():
-    file = str(shipped_path("rigs", "feetech"))
+def test_a_rule_that_hangs_leaves_limp_servos(tmp_path: Path):
+    file = at_rate(tmp_path, "feetech", 50.0)
     rig = load_rig(file)
     with PtyBuses() as buses:
         (path,) = buses.start(emulated_lines(rig)).values()

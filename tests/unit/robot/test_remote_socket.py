@@ -50,7 +50,7 @@ class Beat:
     """A simulated robot whose loop runs in a thread, slowly enough to leave the processor."""
 
     def __init__(self) -> None:
-        self.made = made = simulated()
+        self.made = made = simulated(bus="ideal")
         self.robot: Robot = made.robot
         self.clock = made.clock
         self.pulse = TickFeed()

@@ -26,7 +26,7 @@ from jsonschema import Draft202012Validator
 from mcap.reader import make_reader
 from mcap.writer import Writer
 from msgspec.structs import replace
-from recorded_run import STARTED, Recorded, assembly, exact, info_for
+from recorded_run import STARTED, Recorded, exact, info_for
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Detections
@@ -237,7 +237,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_pa
     path = tmp_path / "full.mcap"
     recorder = Recorder(path, info_for(), patient=True)
     recorder.open()
-    made = assembly(recorder)
+    made = simulated(seed=7, wrap_body=recorder.wrap_body, bus="ideal")
     made.robot.start(made.clock)
     said: list[str] = []
     goes_on = 0
@@ -263,7 +263,7 @@ def writing(path: Path) -> tuple[Recorder, Run, Any]:
     """Begin to record a robot; give the process of the writer too."""
     recorder = Recorder(path, info_for())
     recorder.open()
-    made = assembly(recorder)
+    made = simulated(seed=7, wrap_body=recorder.wrap_body, bus="ideal")
     made.robot.start(made.clock)
     assert recorder._link is not None
     return recorder, made, recorder._link.process

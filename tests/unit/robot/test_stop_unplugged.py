@@ -10,7 +10,7 @@ from gazerig.robot.model.commands import Resume, Stop
 
 
 def test_a_stop_while_unplugged_is_carried_out_at_once_when_it_is_back(devices, tmp_path):
-    running = Running(simulated(rig_of("mixed", tmp_path), "face-to-face", 2))
+    running = Running(simulated(rig_of("mixed", tmp_path), "face-to-face", 2, rate=50.0))
     robot = running.made.robot
     robot.start(running.made.clock)
 
