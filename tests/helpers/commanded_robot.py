@@ -25,7 +25,7 @@ class Running:
     made: Run
     ticks: list[Tick] = field(default_factory=list)
 
-    def go(self, seconds: float) -> list[Tick]:
+    def go(self, seconds: float = ONE_TICK_S) -> list[Tick]:
         """Run on; give the new ticks."""
         began = len(self.ticks)
         self.count = go(self.made, seconds, self.ticks.append)

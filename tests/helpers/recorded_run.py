@@ -21,10 +21,6 @@ from gazerig.robot.run.run import Run
 STARTED = datetime(2026, 1, 31, 23, 59, 59, 250_000, UTC)
 
 
-def assembly(recorder: Recorder | None = None) -> Run:
-    return simulated(seed=7, wrap_body=recorder.wrap_body if recorder is not None else None)
-
-
 def info_for() -> RunInfo:
     rig = load_rig("desk")
     return RunInfo(
@@ -59,7 +55,7 @@ def record(
     info = info_for()
     recorder = Recorder(path, info, patient=True)
     recorder.open()
-    made = assembly(recorder)
+    made = simulated(seed=7, wrap_body=recorder.wrap_body)
     seen: list[Tick] = []
 
     def watch(tick: Tick) -> None:

@@ -232,7 +232,7 @@ def test_another_resumes_only_who_confirms(running: Running):
         assert by in replied(running, command)
     assert running.made.robot.stopped
     ticket = running.made.robot.command(Resume(who="browser 2", confirmed=True))
-    tick = running.go(ONE_TICK_S)[0]
+    tick = running.go()[0]
     assert ticket.wait(0.0) is not None and not tick.stopped
     assert any("torque on again by browser 2" in event for event in tick.events)
 
@@ -243,7 +243,7 @@ def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool):
     events: list[str] = []
     for _ in range(175):  # 3.5 s, one a tick
         running.order(Resume(who="a loop", confirmed=confirmed))
-        events += [event for tick in running.go(ONE_TICK_S) for event in tick.events]
+        events += [event for tick in running.go() for event in tick.events]
     assert running.made.robot.stopped == "a hand"
     assert len([event for event in events if "resume" in event]) < 10
 
@@ -272,7 +272,7 @@ def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: 
         for order in (LookAt((1.0, 0.2, 0.3)), Jog((("neck_yaw", 0.2),)), Resume(confirmed=True))
     ]
     running.order(Stop("a hand"))
-    assert running.go(ONE_TICK_S)[0].commands == (Stop("a hand"),)
+    assert running.go()[0].commands == (Stop("a hand"),)
     replies = [ticket.wait(0.0) for ticket in tickets]
     assert all(reply is not None and "stopped meanwhile" in reply.refused for reply in replies)
     assert "resume first" in replied(running, LookAt((1.0, 0.2, 0.3)))
@@ -317,7 +317,7 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
         for _ in range(1000):
             robot.command(Ask("lids", "wink left"))
     stop = robot.command(Stop("a hand"))
-    tick = running.go(ONE_TICK_S)[0]
+    tick = running.go()[0]
     assert tick.commands[0] == Stop("a hand") and len(tick.commands) <= 9
     assert stop.wait(0.0) is not None and tick.stopped
     for _ in range(1000):
@@ -331,7 +331,7 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
 @pytest.mark.parametrize("frame", ["world", "head"])
 def test_a_direction_is_looked_in(running: Running, frame: Any):
     running.do(Jog((("neck_yaw", radians(15.0)),), stay=True), 2.0)
-    before = running.go(ONE_TICK_S)[-1].pose
+    before = running.go()[-1].pose
     asked = (radians(10.0), radians(-5.0))
     ticks = running.do(LookAtDirection(asked, frame, stay=True), 2.0)[1]
     pose, point = ticks[-1].pose, ticks[-1].gaze.gaze_point_world_m
@@ -343,7 +343,7 @@ def test_a_direction_is_looked_in(running: Running, frame: Any):
 
 
 def test_a_person_is_followed_with_the_scanpath_on_the_face(running: Running):
-    percept = running.go(ONE_TICK_S)[-1].percept
+    percept = running.go()[-1].percept
     assert percept is not None
     person = percept.faces[0].id
     reply, ticks = running.do(LookAtPerson(person, stay=True), 3.0)
@@ -358,7 +358,7 @@ def test_a_person_is_followed_with_the_scanpath_on_the_face(running: Running):
 
 def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(running: Running):
     assert running.do(LookAtPerson(99))[0].refused.startswith("no visible person '99'; available: ")
-    percept = running.go(ONE_TICK_S)[-1].percept
+    percept = running.go()[-1].percept
     assert percept is not None
     running.do(LookAtPerson(percept.faces[0].id, stay=True))
     blind: Any = lambda found, poses: None  # noqa: E731
@@ -369,7 +369,7 @@ def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(running: Run
 
 
 def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running: Running):
-    tick = running.go(ONE_TICK_S)[-1]
+    tick = running.go()[-1]
     found = tick.detections
     assert found is not None and tick.percept is not None
     x, y, width, height = found.faces[0].box_px
@@ -390,12 +390,12 @@ def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running: Running):
 def test_a_pixel_without_a_frame_is_refused(running: Running):
     nothing: Any = lambda now_s: None  # noqa: E731
     running.made.robot.camera.latest = nothing  # type: ignore[method-assign]
-    running.go(ONE_TICK_S)
+    running.go()
     assert "no camera frame" in running.do(LookAtPixel((1.0, 1.0)))[0].refused
 
 
 def test_leads_are_counted_and_their_ends_have_reasons(running: Running):
-    assert running.go(ONE_TICK_S)[-1].client_control == NO_CLIENT_CONTROL
+    assert running.go()[-1].client_control == NO_CLIENT_CONTROL
     assert running.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].control_number == 1
     reply, ticks = running.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)
     assert (

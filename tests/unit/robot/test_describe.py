@@ -47,18 +47,15 @@ def test_all_files_are_read_by_others(written: Path):
     assert model.njnt == 11 and model.nu == 9
     robot = yourdfpy.URDF.load(str(written / "expressive.urdf"), load_collision_meshes=True)
     assert robot.validate() and robot.errors == []
-    looks = [visual.name for link in _links("expressive") for visual in link.visuals]
+    links = description_of(shipped("expressive")).links
+    looks = [visual.name for link in links for visual in link.visuals]
     assert len(robot.scene.geometry) == len(looks)
     again = mujoco.MjModel.from_xml_path(str(written / "expressive.urdf"))
     assert {again.body(i).name for i in range(again.nbody)} >= {"base_link", "head", "jaw_link"}
     scene = trimesh.load_scene(written / "expressive.glb")
-    nodes = {link.joint.name if link.joint else link.name for link in _links("expressive")}
+    nodes = {link.joint.name if link.joint else link.name for link in links}
     assert nodes <= set(scene.graph.nodes)
     assert sum(path.stat().st_size for path in written.rglob("*") if path.is_file()) < 8e6
-
-
-def _links(rig: str) -> tuple[Any, ...]:
-    return description_of(shipped(rig)).links
 
 
 def test_joints_of_a_urdf_have_limits_and_followers():
@@ -74,12 +71,6 @@ def test_joints_of_a_urdf_have_limits_and_followers():
     assert joint.limit.effort == pytest.approx(0.215, rel=0.2)  # an XL330-M077 at 5 V
     assert robot.joint_map["right_eyes_pan"].mimic.joint == "eyes_pan"
     assert robot.actuated_joint_names == ["eyes_pan", "eyes_tilt"]
-
-
-def _glb(rig: Rig) -> bytes:
-    from gazerig.robot.description.gltf import gltf
-
-    return gltf(description_of(rig))
 
 
 def _tree(data: bytes) -> dict[str, Any]:
@@ -99,8 +90,10 @@ def test_a_joint_has_the_torque_of_its_servo():
 
 @pytest.mark.parametrize("name", SHIPPED)
 def test_gltf_is_one_tree_of_named_nodes_with_the_joints_in_it(name: str):
+    from gazerig.robot.description.gltf import gltf
+
     description = description_of(shipped(name))
-    tree = _tree(_glb(shipped(name)))
+    tree = _tree(gltf(description))
     nodes = tree["nodes"]
     names = [node["name"] for node in nodes]
     assert len(set(names)) == len(names)

@@ -237,7 +237,7 @@ def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_pa
     path = tmp_path / "full.mcap"
     recorder = Recorder(path, info_for(), patient=True)
     recorder.open()
-    made = simulated(seed=7, wrap_body=recorder.wrap_body, bus="ideal")
+    made = simulated(wrap_body=recorder.wrap_body, bus="ideal")
     made.robot.start(made.clock)
     said: list[str] = []
     goes_on = 0
@@ -263,7 +263,7 @@ def writing(path: Path) -> tuple[Recorder, Run, Any]:
     """Begin to record a robot; give the process of the writer too."""
     recorder = Recorder(path, info_for())
     recorder.open()
-    made = simulated(seed=7, wrap_body=recorder.wrap_body, bus="ideal")
+    made = simulated(wrap_body=recorder.wrap_body, bus="ideal")
     made.robot.start(made.clock)
     assert recorder._link is not None
     return recorder, made, recorder._link.process
