@@ -17,7 +17,7 @@ from gazerig.doors.door import DoorLink
 
 @pytest.fixture(autouse=True)
 def look_often(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("_WATCH_S", "_LOOK_S"):
+    for name in ("FIRST_WAIT_S", "_WATCH_S", "_LOOK_S"):
         monkeypatch.setattr(f"gazerig.doors.door.{name}", 0.02)
 
 

@@ -61,8 +61,9 @@ def test_played_speech_ends_by_its_length():
 # A neighbour on this computer
 
 
-def test_a_voice_assistant_is_followed_and_found_again():
+def test_a_voice_assistant_is_followed_and_found_again(monkeypatch: pytest.MonkeyPatch):
     """It is not there at first; it sends nonsense, a flood, and closes; it returns."""
+    monkeypatch.setattr("gazerig.doors.door.FIRST_WAIT_S", 0.1)
     assistant = Assistant()
 
     async def scenario(link: DoorLink, head: TalkingHead) -> None:

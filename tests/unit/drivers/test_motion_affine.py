@@ -31,14 +31,13 @@ def seen(
     slide: tuple[float, float],
     spin: float,
     loom: float,
-    count: int = 7,
     at: tuple[float, float] = (160.0, 120.0),
 ) -> list[MovingBlob]:
     """Move a textured disc over textured ground; give what was found of it, picture by picture.
 
     slide px/s, spin rad/s clockwise, loom 1/s; at: its middle halfway, px
     """
-    rng = np.random.default_rng(4)
+    count, rng = 6, np.random.default_rng(4)
     detector = MotionDetector(MotionParams())
     cover = cv2.circle(np.zeros((400, 400)), (200, 200), round(radius), 1.0, -1)
     out: list[Any] = []
