@@ -34,7 +34,7 @@ def shown(
 
     def in_simulated_time(rig: str = "desk", **options: Any) -> gazerig.SimulatedHead:
         assert options.pop("mock", False) or options.pop("fast", False), "it would move real servos"
-        file = Path(at_rate(tmp_path, rig, 50.0))
+        file = Path(at_rate(tmp_path, rig, 40.0))
         file.write_text(file.read_text("utf-8") + "motion: {enabled: false}\n", "utf-8")
         return opened(str(file), fast=True, **options)
 
