@@ -6,19 +6,19 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[3]
 LARGEST = {
-    "gaze": 55_460,
-    "drivers": 79_520,
+    "gaze": 54_170,
+    "drivers": 79_370,
     "sim_mock": 35_870,
-    "config": 11_560,
-    "robot": 119_390,
-    "robot/dashboard": 21_800,
-    "gazerig": 12_900,
+    "config": 11_540,
+    "robot": 117_900,
+    "robot/dashboard": 21_780,
+    "gazerig": 12_890,
     "doors": 8_500,
-    "features/animation": 5_440,
-    "features/bringup": 33_850,
-    "features/lab": 25_960,
-    "features/study": 10_150,
-    "features/world": 33_960,
+    "features/animation": 5_430,
+    "features/bringup": 33_830,
+    "features/lab": 25_940,
+    "features/study": 10_140,
+    "features/world": 33_910,
     "tests": 380_000,
 }
 OPENING, CLOSING = set("([{"), set(")]}")
