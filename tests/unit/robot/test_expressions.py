@@ -62,13 +62,13 @@ def test_a_blend_ends_exactly_at_its_goal_and_then_costs_nothing():
 def test_an_expression_moves_joints_brows_and_head_and_the_eyes_stay_on_target(
     made: Run,
 ):
-    ticks(made, 400)
+    ticks(made, 200)
     made.robot.command(Express("happy"))
-    last = ticks(made, 300)[-1]
+    last = ticks(made, 200)[-1]
     angles = desired_deg(made, last)
     assert (angles["jaw"], angles["left_brow"]) == pytest.approx((6.0, 8.0))
     plain = started(replace(expressive_rig(), expressions={}))
-    quiet = desired_deg(plain, ticks(plain, 700)[-1])
+    quiet = desired_deg(plain, ticks(plain, 400)[-1])
     assert angles["neck_roll"] - quiet["neck_roll"] == pytest.approx(4.0, abs=0.2)
     assert angles["left_eye_tilt"] != pytest.approx(quiet["left_eye_tilt"], abs=0.01)
     plain.close()

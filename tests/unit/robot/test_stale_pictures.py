@@ -82,7 +82,7 @@ class Unplugged:
 def watched(scene: Passer) -> tuple[Rig, list[Tick]]:
     """Run the rig before a scene, its camera unplugged for a while."""
     rig = load_rig("desk")
-    rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
+    rig = replace(rig, loop=replace(rig.loop, rate_hz=50.0))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(surroundings, "load_scene", lambda name, seed: scene)
         made = simulated(rig, scene.name, 3)
