@@ -5,6 +5,7 @@ import os
 import resource
 import signal
 import sys
+import tempfile
 from collections.abc import Callable, Iterator
 from math import inf
 from typing import TYPE_CHECKING
@@ -79,6 +80,14 @@ def chromium_ends() -> Iterator[None]:
     yield
     if "browser" in sys.modules:
         sys.modules["browser"].end_chromium()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_sockets() -> Iterator[None]:
+    """Have a worker's heads listen where no other command reaches them, nor theirs a real head."""
+    with tempfile.TemporaryDirectory(prefix="gz-") as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("XDG_RUNTIME_DIR", folder)
+        yield
 
 
 @pytest.fixture(scope="session", autouse=True)
