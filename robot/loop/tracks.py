@@ -82,7 +82,7 @@ class TrackFit:
             order: The order to play it.
 
         Raises:
-            ValueError: The rig has nothing that it moves, or it has no such cue.
+            ValueError: The rig has nothing that it moves, it has no such cue, or it ends before.
         """
         from_s = track.cues.get(order.from_s) if isinstance(order.from_s, str) else order.from_s
         if from_s is None:
@@ -113,6 +113,8 @@ class TrackFit:
             lacking += [] if members else [name]
         end_s = order.sound_s if keys else max(order.sound_s, _LEAST_S)
         motion = Motion(keys, [end_s, *track.cues.values()], bounds[2:], owned, order.speed)
+        if from_s > motion.length_s:
+            raise ValueError(f"{order.track} lasts {motion.length_s:.2f} s: from_s must be less")
         slower = motion.duration_s * order.speed / motion.length_s
         if slower > 1.005:  # as the text shows it
             slow = _joint_name(self._names[motion.slowest])

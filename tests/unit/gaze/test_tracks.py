@@ -453,6 +453,8 @@ def test_loops_cues_and_a_clock_of_a_sound():
     assert state.position_s == pytest.approx((1.12 + 4.0) % 2.0, abs=0.012)
     with pytest.raises(ValueError, match="no cue 'no'; available: top, end"):
         it.choices.prepare(Play("hello", from_s="no"))
+    with pytest.raises(ValueError, match="hello lasts 2.00 s: from_s must be less"):
+        it.choices.prepare(Play("hello", from_s=99.0))
     it.play("hello", t, from_s="top")
     (playing,) = [one for one in it.player.states(t) if one.is_playing]
     assert playing.position_s <= 1.0
