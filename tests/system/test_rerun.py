@@ -36,6 +36,7 @@ from gazerig.robot.model.commands import (
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.recording.run_info import RunEnd
 from gazerig.robot.recording.writer import RunWriter
+from gazerig.robot.run.options import RunOptions
 from gazerig.robot.run.rerun import rerun
 from gazerig.robot.run.run import Run
 
@@ -147,3 +148,11 @@ def test_a_show_is_done_again_to_the_same_bytes(tmp_path: Path):
         (tmp_path / f"{name}.yaml").unlink()
     again = rerun(RunRecording(tmp_path / "run.mcap"))
     assert again.is_same and again.sent_bytes_same is True, again
+
+
+def test_only_simulated_time_has_bytes_that_a_rerun_repeats():
+    for fast in (True, False):
+        options = RunOptions(mock=True, fast=fast, page=None).check_and_complete()
+        made = Run(load_rig("desk"), options)
+        assert (made.bus.sent_bytes_digest() is None) is not fast
+        made.close()
