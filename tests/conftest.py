@@ -66,12 +66,14 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.fixture(autouse=True)
-def restored_ctrl_c() -> Iterator[None]:
-    """Restore the handler of Ctrl-C after a command in the test's own process."""
-    before = signal.getsignal(signal.SIGINT)
+def restored_signals() -> Iterator[None]:
+    """Restore the handlers of signals after a command or a head in the test's own process."""
+    numbers = signal.SIGINT, signal.SIGTERM, signal.SIGHUP
+    before = [signal.getsignal(number) for number in numbers]
     yield
-    if signal.getsignal(signal.SIGINT) is not before:
-        signal.signal(signal.SIGINT, before)
+    for number, handler in zip(numbers, before, strict=True):
+        if signal.getsignal(number) != handler:
+            signal.signal(number, handler)
 
 
 @pytest.fixture(scope="session", autouse=True)

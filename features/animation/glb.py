@@ -147,7 +147,7 @@ class GltfFile:
         if accessor.buffer_view is None or accessor.sparse is not UNSET or not (plain and width):
             raise SetupError(f"{where}: sparse or no plain numbers; export without compression")
         view: BufferView = self.item("buffer_views", accessor.buffer_view)
-        if view.extensions:  # EXT_meshopt_compression
+        if any("meshopt" in name for name in view.extensions):
             raise SetupError(f"{where}: compressed by meshopt; export without compression")
         row = 4 * width
         stride = view.byte_stride or row

@@ -14,8 +14,7 @@ from gazerig.robot.run.run import Run
 
 YAW = GAZE_JOINTS.index("neck_yaw")
 NECK = slice(YAW, YAW + 3)
-RATE_HZ = 50.0
-ONE_TICK_S = 1.2 / RATE_HZ
+ONE_TICK_S = 0.006
 
 
 @dataclass
@@ -47,7 +46,7 @@ class Running:
 @contextmanager
 def running_desk() -> Iterator[Running]:
     """Run a desk rig face to face with a person, for a second as yet."""
-    made = simulated(scene="face-to-face", seed=3, rate=RATE_HZ)
+    made = simulated(scene="face-to-face", seed=3)
     made.robot.start(made.clock)
     try:
         running = Running(made)

@@ -256,7 +256,7 @@ class Ticking:
         ),
         (
             signal.SIGSTOP,
-            CameraRecovery(silent_s=0.5, restart_s=1.0),
+            CameraRecovery(silent_s=1.0, restart_s=2.0),
             "camera lost (no new frame): waiting for it",
         ),
     ],
@@ -264,17 +264,16 @@ class Ticking:
 def test_a_process_that_ends_or_hangs_is_told_of_and_started_again(end, care, reported):
     camera = process(Ticking, care)
     camera.open()
-    wait_for(lambda: camera.frames > 5)
+    wait_for(lambda: camera.frames > 20)
     first, before = pid_of(camera), present(camera.latest(0.0))
     assert before.located is not None
     os.kill(first, end)
     assert camera.latest(0.0) is not None, "the last picture stays, and its age tells"
-    wait_for(lambda: present(camera.latest(0.0)).number > before.number + 5)
+    wait_for(lambda: present(camera.latest(0.0)).number > before.number + 20)
     after = present(camera.latest(0.0))
     assert after.captured_s > before.captured_s + 0.2 and after.image is not None
-    # On a busy machine it may fall silent for half a second more than once.
-    lines = camera.events()
-    assert set(lines[::2]) == {reported} and lines[1].startswith("camera back after")
+    lost, back = camera.events()
+    assert lost == reported and back.startswith("camera back after")
     assert pid_of(camera) != first
     camera.close()
 

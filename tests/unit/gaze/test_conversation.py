@@ -111,7 +111,7 @@ def test_a_turn_is_thought_spoken_and_interrupted_with_the_gaze(running: Running
     running.do(Talk("thinking", stay=True), 0.5)
     assert running.ticks[-1].target.kind == "away"
     running.do(Talk("interrupt", stay=True))
-    assert wait_for(running, "face", 0.3) < 0.05
+    assert wait_for(running, "face", 0.3) < 0.02
 
 
 def test_a_listener_nods_on_the_robot():

@@ -195,8 +195,6 @@ class ParkingHead:
 
 def test_signals_of_one_closed_terminal_do_not_skip_the_parking_of_a_program_s_head():
     signals, head = ProgramSignals(), ParkingHead()
-    for number in (signal.SIGTERM, signal.SIGHUP):  # a head that a thread has closed leaves its own
-        signal.signal(number, signal.SIG_DFL)
     signals.add(head)
     try:
         for number in (signal.SIGTERM, signal.SIGTERM, signal.SIGHUP):
