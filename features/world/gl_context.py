@@ -7,7 +7,7 @@ library reports failures differently, so both are tried and every failure is rep
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from importlib import import_module
 from types import ModuleType
 from typing import Any, TypeVar
@@ -41,14 +41,13 @@ def open_context(make: Callable[[], Made]) -> tuple[Any, Made]:
         # MuJoCo reads the variable again when it looks for the library's functions.
         with _environment("MUJOCO_GL", backend):
             try:
-                context = import_module(f"mujoco.{backend}").GLContext(64, 64)
-                try:
+                with ExitStack() as kept:
+                    context = import_module(f"mujoco.{backend}").GLContext(64, 64)
+                    kept.callback(context.free)
                     # No longer than necessary: another thread may render
                     with context.as_current():
                         made = make()
-                except Exception:
-                    context.free()
-                    raise
+                    kept.pop_all()
             except Exception as error:  # each library has its own errors
                 why[backend] = _one_line(error)
                 _forget_opengl()
