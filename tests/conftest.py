@@ -1,5 +1,6 @@
 """Shared by all tests: steady examples, the environment, marks and fixtures."""
 
+import fcntl
 import gc
 import os
 import resource
@@ -7,6 +8,7 @@ import signal
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import nullcontext
 from math import inf
 from typing import TYPE_CHECKING
 
@@ -47,6 +49,23 @@ os.environ["GAZERIG_MODELS"] = os.path.join(os.devnull, "models")
 # only wait for each other. Read when the library loads, so before any test imports it.
 for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):
     os.environ.setdefault(threads, "1")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers() -> int:
+    """Have two workers a core: their tests wait for other programs a third of the time."""
+    return 2 * len(os.sched_getaffinity(0))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection() -> Iterator[object]:
+    """Have one worker compile the tests of a fresh clone, while the others wait for it."""
+    with open(__file__) as turn:
+        try:
+            fcntl.flock(turn, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            fcntl.flock(turn, fcntl.LOCK_SH)
+        return (yield)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -94,9 +113,14 @@ def own_sockets() -> Iterator[None]:
 
 @pytest.fixture(scope="session", autouse=True)
 def forked_children() -> Iterator[None]:
-    """Have emulated buses and writers of recordings in forks, which load no module."""
+    """Have emulated buses and writers of recordings in forks, which load no module.
+
+    Nor does each head that starts look for garbage among all that pytest has loaded.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(child_process, "start", start_child)
+        patch.setattr("gazerig.robot.loop.loop.freeze_objects", lambda: None)
+        patch.setattr("gazerig.robot.run.session.frozen_objects", nullcontext)
         yield
 
 

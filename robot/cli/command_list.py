@@ -1,7 +1,7 @@
 """The commands of ``gazerig``: their modules, lines in the list of commands, and examples.
 
 The list is static, because a short command must not import the modules of all others;
-tests/system/test_cli_start.py compares it with them. Commands of features and packages come from
+tests/unit/robot/test_console.py compares it with them. Commands of features and packages come from
 entry points, those of the core are in commands.json.
 """
 

@@ -5,7 +5,7 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -16,61 +16,6 @@ from features_there import needs_all_features
 
 import gazerig
 from gazerig.drivers.errors import extra_hint
-
-_SERVES = """
-import atexit, json, os, sys, threading, traceback
-import gazerig.robot.run.session
-print("loaded", flush=True)
-for line in sys.stdin:
-    asked = json.loads(line)
-    fork = os.fork()
-    if fork == 0:
-        for stream, file in enumerate(asked["said"], 1):
-            os.dup2(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_APPEND), stream)
-        status = 0
-        try:
-            os.chdir(asked["folder"])
-            exec(asked["code"], {"__name__": "__main__"})
-        except BaseException:
-            traceback.print_exc()
-            status = 1
-        threading._shutdown()
-        atexit._run_exitfuncs()
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(status)
-    print(os.waitstatus_to_exitcode(os.waitpid(fork, 0)[1]), flush=True)
-"""
-
-
-class LightPython:
-    """Runs code in a process that has imported gazerig.robot.run.session alone."""
-
-    def __init__(self, folder: Path) -> None:
-        self._folder, self._count = folder, 0
-        pipe = subprocess.PIPE
-        self._process = subprocess.Popen(
-            [sys.executable, "-c", _SERVES], stdin=pipe, stdout=pipe, text=True
-        )
-        assert self._process.stdout is not None and self._process.stdout.readline() == "loaded\n"
-
-    def run(self, code: str, folder: Path) -> tuple[str, str]:
-        """Run code in a folder; return what it wrote to its standard output and error."""
-        self._count += 1
-        said = [self._folder / f"{self._count}.{stream}" for stream in ("out", "err")]
-        asked = {"code": code, "folder": str(folder), "said": [str(file) for file in said]}
-        assert self._process.stdin is not None and self._process.stdout is not None
-        self._process.stdin.write(f"{json.dumps(asked)}\n")
-        self._process.stdin.flush()
-        status = self._process.stdout.readline()
-        out, err = (file.read_text(encoding="utf-8") for file in said)
-        assert status == "0\n", err
-        return out, err
-
-    def close(self) -> None:
-        """End it."""
-        self._process.communicate()
-
 
 ROOT = Path(__file__).parents[2]
 
@@ -89,16 +34,17 @@ for words in COMMANDS:
 """
 
 
-OF_EXTRAS = (
-    *("matplotlib", "depthai", "scipy", "jinja2", "mujoco", "ai_edge_litert", "distributed"),
-)
+OF_EXTRAS = "matplotlib", "depthai", "scipy", "jinja2", "mujoco", "ai_edge_litert", "distributed"
 
 
-@pytest.fixture(scope="module")
-def python(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LightPython]:
-    light = LightPython(tmp_path_factory.mktemp("said"))
-    yield light
-    light.close()
+def python(code: str, folder: Path, **variables: str) -> tuple[str, str]:
+    """Run code in a process of its own; return what it wrote to its standard output and error."""
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True, text=True, cwd=folder, env={**os.environ, **variables},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout, done.stderr
 
 
 def _code(*commands: tuple[str, ...], absent: Sequence[str]) -> str:
@@ -106,19 +52,16 @@ def _code(*commands: tuple[str, ...], absent: Sequence[str]) -> str:
 
 
 def without_extras(
-    python: LightPython, folder: Path, *commands: tuple[str, ...], absent: Sequence[str] = OF_EXTRAS
+    folder: Path, *commands: tuple[str, ...], absent: Sequence[str] = OF_EXTRAS
 ) -> tuple[list[str], list[str]]:
     """Run commands without some packages; return their exit codes and output."""
-    out, err = python.run(_code(*commands, absent=absent), folder)
+    out, err = python(_code(*commands, absent=absent), folder)
     return re.findall(r"^exit (\d+)$", out, re.MULTILINE), err.splitlines()
 
 
 @needs_all_features
-def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_done(
-    python: LightPython, tmp_path: Path
-):
+def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_done(tmp_path: Path):
     codes, said = without_extras(
-        python,
         tmp_path,
         ("report", "--scene", "face-to-face"),
         ("report", "a.mcap", "b.mcap"),
@@ -178,10 +121,10 @@ with_mujoco = pytest.mark.skipif(
 
 
 @pytest.mark.pty
-def test_the_process_of_the_loop_imports_little(python: LightPython, tmp_path: Path):
+def test_the_process_of_the_loop_imports_little(tmp_path: Path):
     film = write_film(tmp_path / "film.avi", 5, 25.0)
     options = {"video": film, "page": "127.0.0.1:8770"}
-    text, _ = python.run(RUN.format(options=options, later=LATER), tmp_path)
+    text, _ = python(RUN.format(options=options, later=LATER), tmp_path)
     said = {line.split()[0]: set(line.split()[1:]) for line in text.splitlines() if line}
     assert said["PACKAGES"] >= {"numpy", "serial", "gazerig"}
     assert not said["PACKAGES"] - ALLOWED
@@ -189,7 +132,7 @@ def test_the_process_of_the_loop_imports_little(python: LightPython, tmp_path: P
 
 
 @with_mujoco
-def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_path: Path):
+def test_the_loop_of_an_ordinary_run_knows_no_world(tmp_path: Path):
     """Nor does that of a world in real time know MuJoCo: it is in two other processes."""
     pytest.importorskip("gazerig.features.world")
     code = (
@@ -204,7 +147,7 @@ def test_the_loop_of_an_ordinary_run_knows_no_world(python: LightPython, tmp_pat
         "assert not [m for m in sys.modules if m.split('.')[0] in heavy]; "
         "print('ok')"
     )
-    assert python.run(code, tmp_path)[0].splitlines()[-1] == "ok"
+    assert python(code, tmp_path)[0].splitlines()[-1] == "ok"
 
 
 # ---- Without the folders of features/ the rest runs as before, and names what is missing.
@@ -215,11 +158,8 @@ RUN_COMMAND = ("run", "desk", "--mock", "--fast", "--no-page", "--scene", "visit
 
 
 @needs_all_features
-def test_without_extras_and_without_features_the_head_runs_with_the_same_bytes(
-    python: LightPython, tmp_path: Path
-):
+def test_without_extras_and_without_features_the_head_runs_with_the_same_bytes(tmp_path: Path):
     codes, said = without_extras(
-        python,
         tmp_path,
         RUN_COMMAND,
         ("check", "desk"),
@@ -233,13 +173,12 @@ def test_without_extras_and_without_features_the_head_runs_with_the_same_bytes(
         if entry.name not in ("features", "__pycache__"):
             (core / "gazerig" / entry.name).symlink_to(entry.resolve())
     helps = [(command, "--help") for command in ("study", "report", "scan", "import")]
-    done = subprocess.run(
-        [sys.executable, "-c", _code(RUN_COMMAND, ("--help",), *helps, absent=())],
-        capture_output=True, text=True, cwd=core, env={**os.environ, "PYTHONPATH": str(core)},
-    )  # fmt: skip
-    assert re.findall(r"^exit (\d+)$", done.stdout, re.MULTILINE) == ["0", "0", *["2"] * 4]
-    assert " run " in done.stdout and " study " not in done.stdout
-    assert done.stderr.count("No module named 'gazerig.features.") == len(helps)
+    out, err = python(
+        _code(RUN_COMMAND, ("--help",), *helps, absent=()), core, PYTHONPATH=str(core)
+    )
+    assert re.findall(r"^exit (\d+)$", out, re.MULTILINE) == ["0", "0", *["2"] * 4]
+    assert " run " in out and " study " not in out
+    assert err.count("No module named 'gazerig.features.") == len(helps)
     with_all = figures("desk", "--no-page", "--scene", "visitor", "--seconds", "0.5", "--seed", "0")
     for folder in (tmp_path, core):
         run = json.loads((folder / "run.json").read_text())

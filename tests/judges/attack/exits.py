@@ -30,8 +30,10 @@ from child_processes import children, end, running_as
 LONGEST_S = 20.0
 
 HEADS = """
-import os, signal, sys, threading, time
+import logging, os, signal, sys, threading, time
 import gazerig
+
+logging.basicConfig(level="INFO")
 
 def hold(stack):
     for rig, port in zip(sys.argv[1::2], sys.argv[2::2]):
@@ -272,7 +274,7 @@ def held(interface: str, benches: list[Bench], begin: Begin) -> Iterator[Target]
             start_new_session=True,
             stdin=null,
             stdout=null,
-            stderr=null,
+            stderr=(folder / "errors").open("w"),
         )
         try:
             yield Target(program, program.pid, folder)
@@ -289,7 +291,7 @@ def _holds(program: "subprocess.Popen[bytes]", benches: list[Bench]) -> bool:
 
 
 class Row(NamedTuple):
-    """Outcome of a case; void: reason why it proves nothing, or ""."""
+    """Outcome of a case; void: reason why it proves nothing, or ""; told: its standard error."""
 
     powered: int
     of: int
@@ -297,6 +299,7 @@ class Row(NamedTuple):
     code: int | None
     void: str
     off_park_deg: float = 0.0
+    told: str = ""
 
 
 def case(
@@ -330,7 +333,8 @@ def case(
         if exit_ not in STAYS:
             yield from until(lambda: program.poll() is not None, 8.0)
         off_deg = max(at.off_park_deg() for at in benches)
-        return Row(left, of, took_s, program.poll(), "", off_deg)
+        told = (target.folder / "errors").read_text()
+        return Row(left, of, took_s, program.poll(), "", off_deg, told)
 
 
 def main() -> int:

@@ -1,4 +1,4 @@
-"""``gazerig`` alone suggests next steps; help has examples that parse; errors are one line."""
+"""``gazerig`` alone suggests next steps; errors are one line."""
 
 import logging
 from collections.abc import Iterator
