@@ -45,16 +45,19 @@ sys.dont_write_bytecode = False
 # Tests do not use files that the user of this machine has fetched.
 os.environ["GAZERIG_MODELS"] = os.path.join(os.devnull, "models")
 
-# Tests run side by side, one worker a core: threads of a numeric library in each of them would
-# only wait for each other. Read when the library loads, so before any test imports it.
+# Tests run side by side, more than one worker a core: threads of a numeric library in each of
+# them would only wait for each other. Read when the library loads, so before any test imports it.
 for threads in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "OPENCV_FOR_THREADS_NUM"):
     os.environ.setdefault(threads, "1")
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers() -> int:
-    """Have two workers a core: their tests wait for other programs a third of the time."""
-    return 2 * len(os.sched_getaffinity(0))
+    """Have two workers a core: their tests wait for other programs a third of the time.
+
+    At most eight: a container may show cores that it has not got.
+    """
+    return min(8, 2 * len(os.sched_getaffinity(0)))
 
 
 @pytest.hookimpl(wrapper=True)
