@@ -72,11 +72,9 @@ def pytest_collection() -> Generator[None, object, object]:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark tests that need a browser or a pseudo-terminal; slow tests have their own mark."""
+    """Mark tests that speak over a pseudo-terminal."""
     for item in items:
         fixtures, names = getattr(item, "fixturenames", ()), vars(getattr(item, "module", object))
-        if "tab" in fixtures:
-            item.add_marker("browser")
         if "simulated_wires" not in fixtures and names.keys() & {"PtyBus", "PtyBuses", "pty"}:
             item.add_marker("pty")
 

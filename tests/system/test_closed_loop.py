@@ -7,7 +7,6 @@ from math import degrees
 from typing import NamedTuple
 
 import numpy as np
-import pytest
 from fakes.runs import play, simulated
 from numpy.typing import NDArray
 
@@ -112,7 +111,6 @@ def watched(scene: str, seconds: float) -> Seen:
     return Seen(*np.array(rows, float).T)
 
 
-@pytest.mark.slow
 def test_a_face_that_steps_aside_is_looked_at_again_without_overshoot():
     """Its pictures are placed by the pose at their capture."""
     step = watched("steps-aside", ARRIVED_S + 1.4)

@@ -84,7 +84,6 @@ def works_until_ctrl_c(process: subprocess.Popen[str], first: str) -> None:
         process.communicate()
 
 
-@pytest.mark.slow
 def test_commands_to_a_running_head_work(folder: Path):
     """Of one head for all: the expressive one with the track of the tutorial."""
     [agree] = [b.text for b in blocks("yaml") if b.text.startswith('description: "a small nod')]

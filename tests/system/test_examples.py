@@ -67,7 +67,6 @@ def test_the_gaze_runs_round_the_circle_and_the_visitor_is_printed_where_he_is(s
     assert sum("looks at face 1" in line for line in lines) > 10
 
 
-@pytest.mark.slow
 def test_own_detectors_cameras_and_rules_lead_the_gaze(
     shown: Shown, monkeypatch: pytest.MonkeyPatch
 ):
@@ -140,7 +139,6 @@ def test_the_own_door_passes_words_on_and_a_key_starts_a_track(
     assert shown("midi.py")[-2:] == ["nod takes 1 s", "stopped"]
 
 
-@pytest.mark.slow
 def test_the_sweep_shows_what_speeds_do_and_repeats_itself(shown: Shown):
     lines = shown("sweep.py")
     rows = [numbers(line) for line in lines[1:]]

@@ -18,7 +18,6 @@ from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.run.options import RunOptions
 
 
-@pytest.mark.slow
 def test_a_round_of_the_visitor_who_comes_moves_waves_leaves_and_comes_back(tmp_path: Path):
     slow = at_rate(tmp_path, "desk", 50.0)
     asked = RunOptions(True, True, seed=1, scene="visitor", rig=slow, seconds=44.0)
@@ -42,7 +41,6 @@ def test_a_round_of_the_visitor_who_comes_moves_waves_leaves_and_comes_back(tmp_
     assert np.percentile(off_deg, 95.0) < 6.5
 
 
-@pytest.mark.slow
 def test_e59_before_a_photo_same_seed_same_bytes_in_another_process(tmp_path: Path):
     data = pytest.importorskip("skimage.data", reason="scikit-image ships the photo")
     photo = str(tmp_path / "photo.png")

@@ -90,7 +90,6 @@ def ticks(desk_rig: Rig) -> list[Tick]:
     return run_ticks(desk_rig, 15.0)
 
 
-@pytest.mark.slow
 def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(results: dict[str, MeasureResult]):
     for key in ("on_parts", "eyes_share", "visit", "never_taken", "heat", "rate",
                 "below_15", "peak_small", "rest_error", "in_cone",
@@ -166,7 +165,6 @@ def test_servos_without_bytes_are_not_judged(walking: GazeTrace, results: dict[s
         assert seen[key].verdict == results[key].verdict == "pass", key
 
 
-@pytest.mark.slow
 def test_the_whole_report_is_written(
     walking: GazeTrace, results: dict[str, MeasureResult], tmp_path: Path
 ):

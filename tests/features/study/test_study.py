@@ -344,7 +344,6 @@ def test_a_session_in_chromium_with_the_keyboard(study: Path, program: Start):
     assert [one.record.value for one in found.answers] == [4, 2, 4, 2, ""]
 
 
-@pytest.mark.slow
 def test_films_are_rendered_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     pytest.importorskip("mujoco")
     from gazerig.drivers.camera.film import Film

@@ -219,7 +219,7 @@ def fish(folder):
     install(folder, "fish", parts, {"fish_camera": FISH})
 
 
-@pytest.mark.parametrize("name", [pytest.param("frames", marks=pytest.mark.slow), "finds"])
+@pytest.mark.parametrize("name", ["frames", "finds"])
 def test_a_camera_of_a_package_is_looked_through_by_its_name(fish, tmp_path, name):
     rig, clock = fish_rig(tmp_path), RealClock()
     options = RunOptions(mock=True, camera=parse_camera(name))

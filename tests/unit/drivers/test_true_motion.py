@@ -75,7 +75,6 @@ def test_true_joints_keep_range_speed_and_acceleration_whatever_is_wished(
     judged(driven(rigs[name], 1, gaps(0, 0.0, 1), 3.0))
 
 
-@pytest.mark.slow
 @settings(max_examples=10, deadline=None, phases=DRAWN)
 @given(
     name=st.sampled_from(NAMES),

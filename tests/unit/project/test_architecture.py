@@ -26,7 +26,11 @@ def packages(path: Path) -> Iterator[str]:
 
 @pytest.mark.parametrize(
     ("files", "allowed"),
-    [("gaze/**/*.py", {"numpy", "msgspec", "gaze", "params"}), ("gazerig/params.py", set())],
+    [
+        ("gaze/**/*.py", {"numpy", "msgspec", "gaze", "params"}),
+        ("gazerig/params.py", set()),
+        ("doors/**/*.py", {"aiohttp", "livekit", "wyoming", "gazerig", "doors"}),
+    ],
 )
 def test_what_stands_on_few_packages_imports_no_other(files: str, allowed: set[str]):
     paths = list(ROOT.glob(files))

@@ -341,7 +341,6 @@ def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
 # Leads of programs, and floods
 
 
-@pytest.mark.slow
 def test_a_program_leads_while_it_lives_and_is_named(
     rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
 ):
