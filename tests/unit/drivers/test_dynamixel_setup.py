@@ -14,7 +14,7 @@ def rig():
     return Rig()
 
 
-def test_open_writes_what_differs_says_so_and_then_nothing(rig):
+def test_open_writes_what_differs_and_says_so(rig):
     servo = rig.chain[2]
     for name, value in (("operating_mode", 4), ("drive_mode", 4), ("max_position_limit", 2500)):
         servo.memory.set(name, value)
@@ -30,12 +30,6 @@ def test_open_writes_what_differs_says_so_and_then_nothing(rig):
     events = rig.bus.events()
     assert "servo 2: Max Position Limit 2500 -> 3000" in events
     assert "servo 2: Return Delay Time 250 -> 0" in events
-    rig.sent.clear()
-    rig.open()
-    assert [packet for packet in rig.sent if packet[7] == 3] == [] == list(rig.bus.events())
-    servo.write(64, b"\x01")
-    rig.open()
-    assert not servo.torque
 
 
 def test_one_message_names_missing_and_wrong_servos_by_joint(rig):
@@ -67,24 +61,3 @@ def test_gains_strength_and_velocity_limit_are_set_where_they_differ_and_told(ri
     assert "jaw (servo 2): Position P Gain 400 -> 700" in events
     bus.open()
     assert not any("->" in line for line in bus.events())
-
-
-def test_a_lost_setup_answer_is_asked_for_again(rig):
-    lost = []
-
-    def lose_every_third(code, raw):
-        lost.append(code)
-        return b"" if len(lost) % 3 == 0 else raw
-
-    rig.port.spoil = lose_every_third
-    rig.open()
-    assert rig.chain[3].memory.get("profile_velocity") == 383
-
-
-def test_servos_without_a_current_sensor_report_their_load_as_it_is():
-    rig = Rig(model="xl430-w250").open()
-    rig.bus.enable_torque()
-    rig.tick([2500] * 3)
-    readings = rig.tick([2500] * 3)
-    assert readings[0].velocity_steps_s > 0.0
-    assert 0.05 < readings[0].load <= 1.0

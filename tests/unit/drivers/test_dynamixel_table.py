@@ -12,7 +12,6 @@ from gazerig.drivers.dynamixel.control_table import (
     STEPS_PER_TURN,
     VELOCITY_UNIT_STEPS_S,
 )
-from gazerig.drivers.dynamixel.family import DYNAMIXEL
 from gazerig.sim_mock.dynamixel.servo import registers_of
 
 RENAMED = {"secondary_shadow_id": "secondary_id", "present_load": "present_current"}
@@ -67,9 +66,3 @@ def test_units_and_turns_are_the_vendors(model):
         assert units["Present Current"] == (pytest.approx(nm, rel=0.35), "N/m")
     else:
         assert units["Present Current"] == (1.0, "raw")
-
-
-def test_error_bits_are_named_even_where_unknown():
-    assert DYNAMIXEL.name_errors(0x21) == ("input voltage", "overload")
-    assert DYNAMIXEL.name_errors(0x02) == ("error bit 0x02",)
-    assert DYNAMIXEL.name_errors(0) == ()

@@ -10,22 +10,6 @@ from gazerig.drivers.types import ServoConfig
 from gazerig.sim_mock.smart_servo.physics import ServoSpec
 
 
-def test_speed_and_acceleration_are_armed_before_the_torque():
-    setups = [ServoConfig(1, "sts3215", 1000, 3000, 700.0, max_accel_steps_s2=5000.0)]
-    rig = Rig([ServoSpec(1, "sts3215", 2000)], setups)
-    rig.bus.open()
-    rig.sent.clear()
-    rig.bus.enable_torque()
-    writes = [(p[5], p[8:-1]) for p in rig.sent if p[4] == 0x83]
-    names = [address for address, _ in writes]
-    assert names.index(41) < names.index(42) < names.index(40)
-    assert dict(writes)[41] == bytes((50,))
-    assert dict(writes)[42][4:] == (700).to_bytes(2, "little")
-    speeds = [abs(rig.tick([3000])[0].velocity_steps_s) for _ in range(60)]
-    assert 600 < max(speeds) < 760
-    assert speeds[1] < 200
-
-
 def test_strength_and_gains_reach_the_servo_and_outlive_a_restart():
     setup = ServoConfig(1, "sts3215", 1000, 3000, 3000.0, gains=(20, 1, 16), strength=0.4)
     rig = Rig([ServoSpec(1, "sts3215", 2000)], [setup])

@@ -91,13 +91,6 @@ def test_a_stray_ff_before_an_answer_makes_it_no_other_servos(stray: bytes):
 # --- the table
 
 
-def test_registers_do_not_overlap():
-    at = 0
-    for register in REGISTERS.values():
-        assert register.address >= at
-        at = register.address + register.size
-
-
 @given(st.sampled_from([r for r in REGISTERS.values() if r.sign is not None]), st.data())
 def test_signed_registers_there_and_back(register, data):
     most = (1 << register.sign) - 1

@@ -116,12 +116,6 @@ def test_a_running_script_is_stopped(world):
     assert not world.board.is_script_running
 
 
-def test_all_goals_are_one_write(held):
-    held.packets()
-    held.bus.write([5000, 6000, 7000])
-    assert held.packets() == [bytes.fromhex("84 00 08 27 84 01 70 2E 84 05 58 36")]
-
-
 # --- errors and restarts
 
 
@@ -203,14 +197,6 @@ def test_a_channel_whose_answers_are_damaged_is_not_held_by_a_guess(held):
     assert held.positions(IDS)[::2] == [GOALS[0], GOALS[2]]
     feedback = held.run(1.0, GOALS)[-1]
     assert feedback.missing == () and all(feedback.torque)
-
-
-def test_nothing_is_sent_to_a_board_that_may_have_restarted(held):
-    held.do("lose all")
-    held.run(TICK_S)
-    held.packets()
-    held.bus.write([7000] * 3)
-    assert held.packets() == []
 
 
 # --- the line

@@ -150,21 +150,6 @@ def test_release_and_close_before_open_do_nothing():
 # --- silence of servos and of this computer
 
 
-@pytest.mark.parametrize("missing", [(1,), (2, 3)])
-def test_silent_servos_are_named_once_and_when_they_answer_again(sts, missing):
-    for servo_id in missing:
-        sts.command(f"lose {servo_id}")
-    expected = [servo_id not in missing for servo_id in IDS]
-    sts.run(0.02, [2000] * 4)  # several silent ones leave the group one after the other
-    assert [sts.heard() for _ in range(50)] == [expected] * 50
-    assert sts.bus.events() == tuple(
-        f"{NAMES[i - 1]} (servo {i}) does not answer: check servo power and cable" for i in missing
-    )
-    sts.command("clear")
-    assert sts.until_all() <= 60
-    assert sum("answers again after" in line for line in sts.bus.events()) == len(missing)
-
-
 def test_a_bus_without_any_answer_is_given_up_in_the_end():
     rig = DynamixelRig(give_up_s=1.6).open()
     rig.bus.enable_torque()
@@ -194,19 +179,6 @@ def test_a_stall_shown_by_a_write_is_healed_by_the_next_read_and_told(xl):
 
 
 # --- faults, and servos that restart
-
-
-def test_an_alert_is_named_though_its_cause_comes_later_and_is_asked_about_seldom():
-    rig = DynamixelRig(direct=True)
-    rig.chain[3].sense("temperature", 90.0)
-    rig.open()
-    for _ in range(8):
-        rig.tick()
-    assert rig.bus.faults() == ("servo 3: overheating",)
-    before, ticks = rig.bus.health().tx_bytes, 50
-    for _ in range(ticks):
-        rig.tick()
-    assert rig.bus.health().tx_bytes - before < 40 * ticks
 
 
 @pytest.mark.parametrize("lost", ["torque", "limits"])
@@ -251,17 +223,6 @@ def test_eeprom_that_differs_is_corrected_under_way_without_torque(xl):
         xl.tick([2000] * 3)
     assert xl.chain[2].memory.get("max_position_limit") == 3000
     assert xl.chain[2].torque and xl.bus.faults() == ()
-
-
-def test_overload_is_named_and_goes(sts):
-    sts.run(0.5, [2000] * 4)
-    sts.command("overload 2")
-    readings = sts.tick([2000] * 4)
-    assert [r.fault for r in readings] == ["", "overload", "", ""]
-    assert sts.bus.faults() == sts.bus.events() == ("jaw (servo 2): overload",)
-    # Another goal ends it.
-    assert sts.run(1.5, [2100] * 4)[1].fault == ""
-    assert sts.bus.faults() == () and "jaw (servo 2): the fault is gone" in sts.bus.events()
 
 
 def test_one_that_is_too_hot_keeps_no_other_without_torque_after_a_replug(sts):

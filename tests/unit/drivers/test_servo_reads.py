@@ -87,7 +87,7 @@ def test_stuffed_answers_and_refusals_are_understood():
     assert everyday[:3] + b"\xfd" in raw and group.parse_whole(raw) is None
     good, _ = sort_answers(group.parse(raw), IDS, 10, 0x7F)
     reply = group.reply(good[1], 1.0)
-    assert reply.values == {"effort": -1, "velocity": -3, "position": 2000}
+    assert (reply.error, reply.values) == (0, {"effort": -1, "velocity": -3, "position": 2000})
     good, _ = sort_answers(group.parse(status(1, 0x87, b"")), IDS, 10, 0x7F)
     reply = group.reply(good[1], 1.0)
     assert (reply.error, reply.values) == (0x87, {})

@@ -32,8 +32,3 @@ def test_only_a_client_at_the_servos_baud_rate_is_heard(make):
     assert ids(bench.ask(1, WRITE, bench.head_of("baud_rate"), slower, baud=BAUD)) == [1]
     assert [len(bench.ask(1, PING, baud=baud)) for baud in (BAUD, 115_200, 9600)] == [0, 1, 0]
     assert [len(bench.ask(ALL, PING, baud=baud)) for baud in (115_200, BAUD)] == [1, 0]
-
-
-@pytest.fixture
-def bench(make):
-    return make()

@@ -4,8 +4,6 @@ import struct
 
 import pytest
 from fastcrc.crc16 import umts
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gazerig.sim_mock.dynamixel.chain import build_dynamixel
 from gazerig.sim_mock.wire import ServoLine
@@ -56,30 +54,3 @@ def test_a_cycle_takes_what_the_formula_says(baud, request_bytes, size, delay):
     assert sum(len(data) for _, data in answers) == size - 23
     delays = (9 if request_bytes is PLAIN else 1) * delay * 2e-6
     assert answers[-1][0] == pytest.approx((59 + size) * 10 / baud + delays, abs=1e-9)
-
-
-@settings(max_examples=40)
-@given(
-    st.lists(
-        st.tuples(
-            st.sampled_from([PING, PLAIN, FAST, GOALS, GOALS + FAST]),
-            st.floats(0.0, 0.01),
-            st.sampled_from([57_600, 1_000_000, 4_000_000]),
-        ),
-        max_size=6,
-    ),
-    st.integers(0, 254),
-)
-def test_nothing_overtakes_and_nothing_is_lost(sendings, delay):
-    wire, plain = Wire(delay), Wire(delay)
-    got, expected, last_s = b"", b"", 0.0
-    for data, pause_s, baud in sendings:
-        wire.now_s += pause_s
-        plain.now_s = wire.now_s
-        got += wire.line.send(data, baud)
-        expected += plain.chain.receive(data)
-    while (due_s := wire.line.next_due_s()) is not None:
-        assert due_s >= last_s
-        last_s = wire.now_s = max(due_s, wire.now_s)
-        got += wire.line.take_arrived()
-    assert got == expected
