@@ -177,51 +177,47 @@ def test_a_joint_far_outside_its_range_is_an_error_with_the_text_of_a_refused_ru
     one(findings, "warn", TILT, "is at step 2500, outside")
 
 
-BOTH_RULES = [
-    ({"torque_enable": 1}, "warn", "torque is on", "hold the joint"),
-    ({"present_temperature": 60}, "warn", "60 degC, it switches off above 70", "cool"),
-    ({"present_position": 1649}, "warn", "is at step 1649, outside", "gazerig calibrate"),
-    ({"return_delay_time": 250}, "warn", "waits 500 us", "--fix"),
-    ({"min_position_limit": 1700}, "warn", "1700..2446 cut the YAML's range 1650..2446", "--fix"),
-    ({"max_position_limit": 4095}, "note", "1650..4095 are wider than the YAML's range", "--fix"),
-]
-DYNAMIXEL_RULES = [
-    ({"homing_offset": -200}, "warn", "Homing Offset -200", "Wizard"),
-    ({"velocity_limit": 100}, "note", "its Velocity Limit is 137 deg/s", "max_speed_deg_s"),
-    (
-        {"shutdown": 1},
-        "warn",
-        "does not switch off at each of overheating, electrical shock, overload (Shutdown 1)",
-        "set Shutdown (63) to 53",
-    ),
-    ({"status_return_level": 1}, "warn", "does not confirm commands", "--fix"),
-    ({"hardware_error_status": 0x20}, "error", "latched: overload", "switch its power off and on"),
-    ({"present_input_voltage": 34}, "error", "3.4 V, its limits are 3.5..7.0 V", "supply"),
-    ({"present_input_voltage": 44}, "warn", "made for 5 V", "thin wires"),
-    ({"baud_rate": 1}, "warn", "its Baud Rate is 57600", "gazerig setup"),
-]
-FEETECH_RULES = [
-    ({"status": 0x20}, "error", "reports: overload", "switch its "),
-    ({"present_input_voltage": 121}, "error", "12.1 V, its limits are 4.0..8.0 V", "sts3215-12v"),
-    ({"angular_resolution": 2}, "warn", "counts 2 turns for one", "--fix"),
-    ({"position_offset": -85}, "note", "shifted by -85 steps", "gazerig calibrate"),
-    ({"max_torque": 400}, "note", "gives 40% of its torque", "Max Torque (16)"),
-    ({"overload_torque": 100}, "warn", "overload protection cannot act", "Overload Torque (36)"),
-]
-RULES = [
-    *((kind, *rule) for kind in (DYNAMIXEL, FEETECH) for rule in BOTH_RULES),
-    *((DYNAMIXEL, *rule) for rule in DYNAMIXEL_RULES),
-    *((FEETECH, *rule) for rule in FEETECH_RULES),
+RULES = """
+both      | torque_enable 1            | warn  | torque is on | hold the joint
+both      | present_temperature 60     | warn  | 60 degC, it switches off above 70 | cool
+both      | present_position 1649      | warn  | is at step 1649, outside | gazerig calibrate
+both      | return_delay_time 250      | warn  | waits 500 us | --fix
+both      | min_position_limit 1700    | warn  | 1700..2446 cut the YAML's range 1650..2446 | --fix
+both      | max_position_limit 4095    | note  | 1650..4095 are wider than the YAML's range | --fix
+dynamixel | homing_offset -200         | warn  | Homing Offset -200 | Wizard
+dynamixel | velocity_limit 100         | note  | its Velocity Limit is 137 deg/s | max_speed_deg_s
+dynamixel | shutdown 1                 | warn  | does not switch off at each of overheating, \
+electrical shock, overload (Shutdown 1) | set Shutdown (63) to 53
+dynamixel | status_return_level 1      | warn  | does not confirm commands | --fix
+dynamixel | hardware_error_status 32   | error | latched: overload | switch its power off and on
+dynamixel | present_input_voltage 34   | error | 3.4 V, its limits are 3.5..7.0 V | supply
+dynamixel | present_input_voltage 44   | warn  | made for 5 V | thin wires
+dynamixel | baud_rate 1                | warn  | its Baud Rate is 57600 | gazerig setup
+feetech   | status 32                  | error | reports: overload | switch its
+feetech   | present_input_voltage 121  | error | 12.1 V, its limits are 4.0..8.0 V | sts3215-12v
+feetech   | angular_resolution 2       | warn  | counts 2 turns for one | --fix
+feetech   | position_offset -85        | note  | shifted by -85 steps | gazerig calibrate
+feetech   | max_torque 400             | note  | gives 40% of its torque | Max Torque (16)
+feetech   | overload_torque 100        | warn  | overload protection cannot act | Overload Torque (36)
+"""
+"""Kind of servo, register and value, level, words of the finding and of its remedy."""
+CASES = [
+    (kind, *rule)
+    for named, *rule in ([*map(str.strip, row.split("|"))] for row in RULES.strip().splitlines())
+    for kind in KINDS.values()
+    if named in ("both", kind.name)
 ]
 
 
-@pytest.mark.parametrize(("kind", "values", "level", "words", "remedy"), RULES)
-def test_what_can_be_wrong(kind, values, level, words, remedy):
-    found = one(apply_rules(servo_state(kind, **values)), level, PAN, words)
+@pytest.mark.parametrize(("kind", "value", "level", "words", "remedy"), CASES)
+def test_what_can_be_wrong(kind, value, level, words, remedy):
+    register, now = value.split()
+    state = servo_state(kind, **{register: int(now)})
+    found = one(apply_rules(state), level, PAN, words)
     assert remedy in found.remedy
     assert bool(found.fixes) == ("--fix" in found.remedy)
     for fix in found.fixes:
-        assert fix.was == {**servo_state(kind).values, **values}[fix.register]
+        assert fix.was == state.values[fix.register]
 
 
 @each
