@@ -183,13 +183,9 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
 # --- gazerig calibrate joints, camera, board and face as they are typed, against emulated buses
 
 
-def calibrate(*words: str) -> Invoked:
-    return invoked("calibrate", *words)
-
-
 def calibrated(*words: str) -> Invoked:
     """Run a calibration that succeeds."""
-    done = calibrate(*words)
+    done = invoked("calibrate", *words)
     assert done.code == 0, done.err
     return done
 

@@ -91,15 +91,10 @@ def test_what_a_terminal_sends_for_keys():
 # --- on a terminal
 
 
-def sitting_at(rig: Path, *words: str) -> OnTerminal:
-    """Begin to calibrate a face on a terminal."""
-    return OnTerminal("calibrate", "face", str(rig), "--mock", "--yes", *words)
-
-
 # Parking takes a bounded time, in which a starved machine does not reach the end.
 def test_ctrl_c_parks_and_writes_nothing(rig: Path):
     before = rig.read_bytes()
-    with sitting_at(rig) as sitting:
+    with OnTerminal("calibrate", "face", str(rig), "--mock", "--yes") as sitting:
         sitting.reads("the tip of your nose: steer")
         sitting.types(b"n")
         sitting.reads("your left eye: steer")

@@ -65,11 +65,11 @@ def setups_of(kind):
 class Rig:
     """Three servos in this process, set as the rig wants them; some may be spoilt."""
 
-    def __init__(self, kind, specs=None):
+    def __init__(self, kind, specs=None, baud=BAUD):
         self.kind, self.setups, self.now_s = kind, setups_of(kind), 10.0
         specs = specs or [ServoSpec(s.id, s.model, 2048) for s in self.setups]
         build = build_feetech if kind is FEETECH else build_dynamixel
-        self.chain = build(specs, lambda: self.now_s, baud=BAUD)
+        self.chain = build(specs, lambda: self.now_s, baud=baud)
         self.port = InProcessPort(self.chain)
         self.port.setBaudRate(BAUD)
         self.reported = []
@@ -338,8 +338,8 @@ MINI, MICRO = "1ffb:008a", "1ffb:0089"
 class BoardRig:
     """A board in this process; what is sent to it is kept."""
 
-    def __init__(self, channels=12, setups=SETUPS, usb="", **board):
-        self.board = build_board(channels, lambda: 0.0, **board)
+    def __init__(self, channels=12, setups=SETUPS, usb=""):
+        self.board = build_board(channels, lambda: 0.0)
         self.sent = b""
         self.port = InProcessPort(self.board, self.tap)
         self.params, self.setups, self.usb = MaestroParams(), setups, usb
@@ -435,44 +435,23 @@ def test_pulses_of_a_pca9685_that_were_left_on(counts: int, level: str, remedy: 
 # --- Setting servos up one at a time, on emulated servos, byte for byte
 
 
-NECK_SETUP = ServoConfig(7, "xc330-m288", 1252, 2844, 2000.0, "neck_yaw")
-
-RATES = DYNAMIXEL.family.baud_rates
-
-
-class Bench:
+class Bench(Rig):
     """Servos on a table, factory fresh by default, which answer at their own rate only."""
 
     def __init__(self, *specs, baud=None, kind=DYNAMIXEL):
-        self.now = 10.0
-        self.kind = kind
-        self.baud = kind.family.factory_baud if baud is None else baud
-        self.model = NECK[kind.name]
-        self.setup = NECK_SETUP._replace(model=self.model)
-        build = build_feetech if kind is FEETECH else build_dynamixel
-        specs = specs or (ServoSpec(1, self.model, 2000),)
-        self.chain = build(specs, lambda: self.now, baud=self.baud)
-        self.port = InProcessPort(self.chain)
-        self.reported = []
-
-    def sleep_until(self, t_s):
-        self.now = max(self.now, t_s)
-        self.chain.positions_steps()
+        self.model, self.baud = NECK[kind.name], baud or kind.family.factory_baud
+        super().__init__(kind, specs or (ServoSpec(1, self.model, 2000),), self.baud)
 
     def find(self):
-        order = (self.kind.family.factory_baud, *self.kind.family.baud_rates)
-        order = tuple(dict.fromkeys(order))
-        answers = search_rates(self.port, self.kind, order, self.reported.append, thorough=True)
+        order = dict.fromkeys((self.kind.family.factory_baud, *self.kind.family.baud_rates))
+        answers = search_rates(
+            self.port, self.kind, tuple(order), self.reported.append, thorough=True
+        )
         return find_alone(answers, self.port.port_name)
 
-    def assign(self, setup=None):
-        found = self.find()
-        return assign_servo(
-            self.port, self.kind, found, setup or self.setup, BAUD, self.reported.append
-        )
-
-    def registers(self):
-        return Transactions(self.port, self.kind.family)
+    def assign(self):
+        setup = self.setups[2]
+        return assign_servo(self.port, self.kind, self.find(), setup, BAUD, self.reported.append)
 
 
 NUMBER = {"dynamixel": (1240, 53), "feetech": (777, 353)}
@@ -481,7 +460,7 @@ NUMBER = {"dynamixel": (1240, 53), "feetech": (777, 353)}
 ANYWHERE = [
     *((kind, *place) for kind in (DYNAMIXEL, FEETECH) for place in ((1, BAUD), (7, 115_200))),
     *((DYNAMIXEL, 1, 57_600), (FEETECH, 200, 57_600)),
-    *((DYNAMIXEL, 200, baud) for baud in RATES if baud != 4_500_000),
+    *((DYNAMIXEL, 200, baud) for baud in DYNAMIXEL.family.baud_rates if baud != 4_500_000),
 ]
 
 
@@ -496,24 +475,20 @@ def test_a_servo_gets_its_id_and_rate_for_good_wherever_it_was(kind, servo_id, b
     assert len(changes) == (servo_id != 7) + (baud != BAUD)
     (servo,) = bench.chain.servos
     assert (servo.id, servo.torque) == (7, False)
-    rate = bench.registers().read(7, "baud_rate")
-    assert rate == kind.family.baud_rates.index(BAUD)
+    assert bench.get(7, "baud_rate") == kind.family.baud_rates.index(BAUD)
     bench.chain[7].restart()
-    bench.sleep_until(bench.now + 1.0)
+    bench.pass_time(1.0)
     bench.chain.refresh()
     bench.port.setBaudRate(BAUD)
     assert ping(bench.port, kind.family, 7, BAUD) is not None
-    assert (
-        kind.family.lock_register is None
-        or bench.registers().read(7, kind.family.lock_register) == 1
-    )
+    lock = kind.family.lock_register
+    assert lock is None or bench.get(7, lock) == 1
 
 
 @each
 def test_a_servo_whose_torque_is_on_is_let_go_first(kind):
     bench = Bench(kind=kind)
-    bench.port.setBaudRate(bench.baud)
-    assert bench.registers().write(1, "torque_enable", 1)
+    bench.hold(1)
     assert bench.assign()[1][0] == "torque 1 -> 0"
     assert not bench.chain[7].torque
 

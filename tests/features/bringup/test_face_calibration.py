@@ -1,17 +1,15 @@
 """Keys to offsets in the face's own frame, and from there to points in the world."""
 
-from collections.abc import Iterator
-from math import degrees, radians
+from math import pi, radians
+from types import SimpleNamespace
 from typing import Any, get_args
 
 import pytest
-from fakes.runs import simulated
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import structs
 
-from gazerig.config.schema import Rig
 from gazerig.features.bringup.calibration.face_steering import (
-    AIMED_DEG,
     FARTHEST_MM,
     ORDER,
     STALE_S,
@@ -20,24 +18,12 @@ from gazerig.features.bringup.calibration.face_steering import (
     Key,
     point_world_m,
 )
-from gazerig.features.bringup.cli.calibrate.face import exact_gaze
-from gazerig.gaze.angles import angle_between, compose, rotation, sub
-from gazerig.gaze.attention.top_down import TopDown
-from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.types import Bodies, Face, Percept, Target
-from gazerig.robot.loop.loop import Tick
+from gazerig.gaze.angles import compose, rotation
+from gazerig.gaze.types import Bodies, Face, GazeState, Percept, Target
+from gazerig.robot.description.links import IDENTITY
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
-from gazerig.robot.run.run import Run
-from gazerig.robot.run.surroundings import load_scene
 
 KEYS = st.lists(st.sampled_from(get_args(Key)), max_size=60)
-
-
-def after(*keys: Key) -> FaceCalibration:
-    state = FaceCalibration({})
-    for key in keys:
-        state.apply(key)
-    return state
 
 
 @given(KEYS)
@@ -53,16 +39,18 @@ def test_no_keys_lead_off_the_face_or_out_of_its_plane(keys: list[Key]):
 
 
 def test_left_is_the_owners_left_and_up_is_up_whatever_the_face_does():
-    state = after("left", "up")
+    state = FaceCalibration({})
+    state.apply("left")
+    state.apply("up")
     assert state.places_mm["N"] == (0.0, 5.0, 5.0)
     # A face that looks back at the robot has its left at the world's -y.
     facing = rotation((radians(180.0), 0.0, 0.0))
-    x, y, z = point_world_m(state.places_mm["N"], (1.0, 0.0, 0.2), facing)
-    assert (x, y, z) == pytest.approx((1.0, -0.005, 0.205))
+    p_m = point_world_m(state.places_mm["N"], (1.0, 0.0, 0.2), facing)
+    assert p_m == pytest.approx((1.0, -0.005, 0.205))
     # Lying on its right shoulder, the owner's left is up in the world.
     lying = compose(facing, rotation((0.0, 0.0, radians(90.0))))
-    x, y, z = point_world_m(state.places_mm["N"], (1.0, 0.0, 0.2), lying)
-    assert z == pytest.approx(0.205) and abs(y) == pytest.approx(0.005)
+    p_m = point_world_m(state.places_mm["N"], (1.0, 0.0, 0.2), lying)
+    assert p_m == pytest.approx((1.0, 0.005, 0.205))
 
 
 # --- A gaze steered over a face: the nearest one, the eyes on the point, and what is refused
@@ -89,60 +77,34 @@ def chosen(made: FaceSteering, t_s: float, *faces: Face, captured_s: float | Non
 # --- whom it looks at
 
 
-def test_a_stale_picture_shows_nobody_and_keys_wait():
+def test_a_face_is_followed_and_its_part_is_the_target_until_it_is_lost():
     made = steering()
-    chosen(made, 1.0, face(1, 1.0))
-    assert chosen(made, 2.0, face(1, 1.0), captured_s=1.9 - STALE_S).kind == "rest"
-    assert "no face is seen" in (made.press("left") or "")
-    assert made.state.places_mm == FaceCalibration({}).places_mm and not made.is_aimed
+    made.state.places_mm["N"] = (0.0, 10.0, -5.0)
+    near, far = face(1, 1.0, yaw=pi), face(2, 1.4)
+    seen = chosen(made, 1.0, far, near)
+    assert (seen.id, seen.part, seen.kind, seen.shift) == (1, "N", "part", 1)
+    assert seen.p_world_m == pytest.approx((1.0, -0.01, 0.195))  # the owner's left is -y
+    assert seen.centre_world_m == near.p_world_m
+    assert chosen(made, 1.1, face(2, 0.6), near).shift == 1
+    # A stale picture shows nobody, and keys wait.
+    gone = [chosen(made, t_s, near, captured_s=t_s - STALE_S - 0.1) for t_s in (1.2, 6.0, 6.2)]
+    assert [one.p_world_m for one in gone] == [seen.p_world_m, seen.p_world_m, REST]
+    assert [one.shift for one in gone] == [2, 2, 3]
+    assert "no face is seen" in (made.press("left") or "") and not made.is_aimed
+    assert chosen(made, 7.0, far).id == 2 and "not taken" in (made.press("enter") or "")
+    assert made.press("skip") is None and chosen(made, 7.1, far).part == ORDER[1]
+    chosen(made, 8.0)
     assert made.press("end") is None and made.state.part is None
 
 
-# --- what the eyes of an emulated rig do
-
-
-@pytest.fixture
-def steered(desk_rig: Rig) -> FaceSteering:
-    return FaceSteering(FaceCalibration({}), TopDown(desk_rig.gaze.top_down), REST)
-
-
-@pytest.fixture
-def made(steered: FaceSteering, desk_rig: Rig) -> Iterator[Run]:
-    found = simulated(exact_gaze(desk_rig), "sits-still", 1, chooser=steered)
-    yield found
-    found.close()
-
-
-def ticks(made: Run, steered: FaceSteering, seconds: float) -> Tick:
-    """Run in simulated time, in which nothing prevents an Enter."""
-    start_s, last_s, tick = made.clock.now_s(), made.clock.now_s(), None
-    for slot in range(1, int(seconds * 200) + 1):
-        made.clock.sleep_until(start_s + slot / 200)
-        t_s = made.clock.now_s()
-        tick = made.robot.tick(t_s, t_s - last_s)
-        steered.update(tick)
-        last_s = t_s
-    assert tick is not None
-    return tick
-
-
-def test_both_eyes_meet_the_true_place_of_the_part_on_the_face(made: Run, steered: FaceSteering):
-    made.robot.start(made.clock)
-    (person,) = load_scene("sits-still").people(0.0)
-    yaw, pitch = person.face_yaw_pitch_rad
-    ticks(made, steered, 1.5)
-    for _ in range(3):
-        for key in ("left", "up", "up"):
-            assert steered.press(key) is None
-        part = steered.state.part
-        assert part is not None
-        true = point_world_m(
-            steered.state.places_mm[part], person.p_world_face_m, rotation((yaw, pitch, 0.0))
-        )
-        pose = ticks(made, steered, 0.6).pose
-        left = angle_between(line_of_sight(pose, True), sub(true, pose.p_world_eye_left_m))
-        right = angle_between(line_of_sight(pose, False), sub(true, pose.p_world_eye_right_m))
-        assert steered.is_aimed and degrees(max(left, right)) < AIMED_DEG
-        steered.press("enter")
-        ticks(made, steered, 0.1)
-        assert part in steered.state.adjusted_parts and steered.state.part != part
+@pytest.mark.parametrize(("aside_m", "aimed"), [(0.017, True), (0.018, False)])
+def test_eyes_are_aimed_within_a_degree_of_the_part(aside_m: float, aimed: bool):
+    made = steering()
+    target = chosen(made, 1.0, face(1, 1.0))
+    pose = GazeState(
+        (0.0,) * 3, (0.0,) * 3, (0.0, 0.0), (0.0, 0.0), IDENTITY, *((0.0, 0.0, 0.2),) * 3, 1.0, 1.0
+    )
+    target = structs.replace(target, p_world_m=(1.0, aside_m, 0.2))
+    tick: Any = SimpleNamespace(target=target, pose=pose, gaze=SimpleNamespace(phase="fixate"))
+    made.update(tick)
+    assert made.is_aimed == aimed

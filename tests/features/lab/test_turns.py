@@ -60,15 +60,3 @@ def test_looks_away_have_the_share_rate_and_direction_of_people(role: Role):
     for one in measures(model_alone(role)):
         if one.key.endswith(role) or (one.key in ("turn_begins", "turn_ends") and len(one.rows)):
             assert judge(one, interval=False).verdict == "pass", one.key
-
-
-def test_a_gaze_is_away_a_degree_beyond_the_edge_of_a_near_face():
-    shares = []
-    for off_deg in (10.5, 11.5):
-        table = np.zeros(200, ROW)
-        table["t"], table["turn"] = np.arange(200) * 0.1, STATES.index("listening")
-        table["face_edge"], table["off_partner"] = 10.0, (off_deg, 0.0)
-        found = {one.key: one.rows for one in measures(GazeTrace(table))}
-        away_s, seen_s = found["averted_listening"].sum(axis=0)
-        shares.append(away_s / seen_s)
-    assert shares == [0.0, 1.0]

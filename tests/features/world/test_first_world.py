@@ -32,20 +32,19 @@ def test_the_room_where_it_can_be_rendered(
     assert capsys.readouterr() == (f"--computer {level} {ROOM}\n", "")
 
 
+def none(make: object) -> object:
+    raise NoRenderer("no pictures of a world: egl: it is missing")
+
+
+@pytest.mark.parametrize(
+    ("spec", "why"), [(None, install_command("world")), (object(), "egl: it is missing")]
+)
 def test_one_line_says_what_is_missing(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    spec: object, why: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
     monkeypatch.setattr(first_world, "load_level", lambda figures: "small")
-    monkeypatch.setattr(first_world, "find_spec", lambda name: None)
-    main()
-    out, err = capsys.readouterr()
-    assert out == "--computer small\n" and install_command("world") in err and err.count("\n") == 1
-
-    def none(make: object) -> object:
-        raise NoRenderer("no pictures of a world: egl: it is missing")
-
-    monkeypatch.setattr(first_world, "find_spec", lambda name: object())
+    monkeypatch.setattr(first_world, "find_spec", lambda name: spec)
     monkeypatch.setattr(first_world, "open_context", none)
     main()
     out, err = capsys.readouterr()
-    assert out == "--computer small\n" and "egl: it is missing" in err and err.count("\n") == 1
+    assert out == "--computer small\n" and why in err and err.count("\n") == 1

@@ -62,39 +62,27 @@ POSES: list[tuple[Mat3, Vec3]] = [
 ]
 
 
-class Balls:
-    """White balls at known points in the dark."""
-
-    def __init__(
-        self,
-        R_world_base: Mat3 = IDENTITY,
-        p_world_base_m: Vec3 = ORIGIN,
-    ) -> None:
-        mujoco = import_mujoco()
-        from gazerig.features.world.renderer import RendererParams, WorldPicture
-
-        bodies = "".join(
-            f'<body mocap="true" pos="{x} {y} {z}"><geom type="sphere" size="{RADIUS_M}"'
-            ' rgba="1 1 1 1"/></body>'
-            for x, y, z in POINTS
-        )
-        model = mujoco.MjModel.from_xml_string(
-            '<mujoco><visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/>'
-            f"</visual><worldbody>{bodies}</worldbody></mujoco>"
-        )
-
-        def place(data: Any, t_s: float) -> None:
-            data.mocap_pos[:] = POINTS
-
-        params = RendererParams(shadow_px=0)
-        self.picture = WorldPicture(model, place, params, (), R_world_base, p_world_base_m)
-
-
 @pytest.fixture(scope="module")
-def balls(renders: None) -> Iterator[Balls]:
-    made = Balls()
-    yield made
-    made.picture.close()
+def balls(renders: None) -> Iterator[Any]:
+    """White balls at known points in the dark."""
+    from gazerig.features.world.renderer import RendererParams, WorldPicture
+
+    bodies = "".join(
+        f'<body mocap="true" pos="{x} {y} {z}"><geom type="sphere" size="{RADIUS_M}"'
+        ' rgba="1 1 1 1"/></body>'
+        for x, y, z in POINTS
+    )
+    model = import_mujoco().MjModel.from_xml_string(
+        '<mujoco><visual><headlight ambient="1 1 1" diffuse="0 0 0" specular="0 0 0"/>'
+        f"</visual><worldbody>{bodies}</worldbody></mujoco>"
+    )
+
+    def place(data: Any, t_s: float) -> None:
+        data.mocap_pos[:] = POINTS
+
+    picture = WorldPicture(model, place, RendererParams(shadow_px=0), (), IDENTITY, ORIGIN)
+    yield picture
+    picture.close()
 
 
 def landed(seen: ImageArray, expected_px: Floats) -> Floats:
@@ -121,10 +109,10 @@ def visible(R: Mat3, p_m: Vec3) -> Floats:
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_a_point_lands_where_the_programs_own_lens_says(balls: Balls, pose: tuple[Mat3, Vec3]):
+def test_a_point_lands_where_the_programs_own_lens_says(balls: Any, pose: tuple[Mat3, Vec3]):
     pixels = visible(*pose)
     assert len(pixels) >= 2
-    seen = balls.picture.draw(PinholeView(0.0, LENS, SIZE, *pose))
+    seen = balls.draw(PinholeView(0.0, LENS, SIZE, *pose))
     assert np.abs(landed(seen, pixels) - pixels).max() < 0.5
 
 

@@ -20,25 +20,20 @@ def refused(tmp_path: Path, acts: str, start: str = "door", more: str = "") -> s
     return str(caught.value)
 
 
-@pytest.mark.parametrize(
-    ("acts", "start", "line", "said"),
-    [
-        ("      - {at_s: 0, do: dance}\n", "door", 7, "walk"),
-        (
-            "      - {at_s: 0, do: walk, to: moon}\n",
-            "door",
-            7,
-            "no 'moon' here; it has behind, chair_left",
-        ),
-        ("      - {at_s: 1, do: sit}\n", "door", 7, "there is no seat at door; walk to one"),
-        ("      - {at_s: 1, do: walk, to: door}\n", "chair_left", 7, "add `stand` before walk"),
-        ("      - {at_s: 1, do: walk, to: front}\n", "door", 6, "began it at door; let it end"),
-    ],
-)
-def test_an_act_that_cannot_be_done_is_refused_at_its_line(
-    tmp_path: Path, acts: str, start: str, line: int, said: str
-):
-    text = refused(tmp_path, acts, start)
+REFUSED = """
+door       | 7 | {at_s: 0, do: dance}          | walk
+door       | 7 | {at_s: 0, do: walk, to: moon} | no 'moon' here; it has behind, chair_left
+door       | 7 | {at_s: 1, do: sit}            | there is no seat at door; walk to one
+chair_left | 7 | {at_s: 1, do: walk, to: door} | add `stand` before walk
+door       | 6 | {at_s: 1, do: walk, to: front} | began it at door; let it end
+"""
+"""Start of a person, line of the fault, the act and the words of its refusal."""
+
+
+@pytest.mark.parametrize("row", REFUSED.strip().splitlines())
+def test_an_act_that_cannot_be_done_is_refused_at_its_line(tmp_path: Path, row: str):
+    start, line, act, said = map(str.strip, row.split("|"))
+    text = refused(tmp_path, f"      - {act}\n", start)
     assert f"own.yaml:{line}:" in text and said in text, text
 
 
