@@ -203,7 +203,6 @@ class DynamixelServo(EmulatedServo):
         """Stop as the bus watchdog does; goals are refused until 98 is cleared."""
         self.memory.bytes[WATCHDOG_AT] = TRIPPED
         self.shaft.hold()
-        self._apply_settings()
 
     # --- reading
 

@@ -19,7 +19,6 @@ class ServoMemory(ABC):
         self.bytes = bytearray(size)
         self._eeprom_end = eeprom_end
         self.restore(eeprom=True)
-        self.restore(eeprom=False)
 
     def get(self, name: str) -> int:
         """Return a register's value."""

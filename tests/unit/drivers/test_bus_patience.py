@@ -56,6 +56,18 @@ def test_patience_is_twice_the_worst_delay_within_its_bounds(delays, late_s):
     assert line.timeout_s == pytest.approx(min(0.02, max(0.001, 2.0 * late_s)), abs=1e-6)
 
 
+def test_a_line_that_never_falls_silent_is_drained_for_a_while():
+    port = Line()
+
+    def babble(length, deadline_s):
+        port.time_s += 0.001
+        return b"x"
+
+    port.read_until = babble  # type: ignore[method-assign]
+    Transactions(port, DYNAMIXEL).drain()  # type: ignore[arg-type]
+    assert port.time_s == pytest.approx(0.06)
+
+
 def test_the_journal_forgets_what_nobody_takes():
     journal = EventLog()
     for k in range(MOST + 5):

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from gazerig.drivers.dynamixel import control_table
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.memory_table import (
     REGISTERS,
@@ -104,6 +105,11 @@ def test_signed_registers_there_and_back(register, data):
 def test_values_of_registers_by_hand():
     assert REGISTERS["position_offset"].encode(-1) == bytes((1, 8))
     assert REGISTERS["present_load"].decode(bytes((0x2C, 0x05))) == -300
+    pwm = control_table.REGISTERS["goal_pwm"]
+    assert [pwm.decode(pwm.encode(value)) for value in (-32768, 32767)] == [-32768, 32767]
+    for value in (-32769, 32768):
+        with pytest.raises(ValueError, match="does not fit"):
+            pwm.encode(value)
     for value in (-1, 256):
         with pytest.raises(ValueError, match=r"acceleration: .* does not fit into 1 byte"):
             REGISTERS["acceleration"].encode(value)

@@ -1,6 +1,6 @@
 """Serial ports as the system shows them, with the names that they keep."""
 
-from gazerig.drivers.serial.list_ports import serial_ports
+from gazerig.drivers.serial.list_ports import serial_ports, usb_id_of
 
 
 def test_ports_have_lasting_names(tmp_path, monkeypatch):
@@ -15,3 +15,5 @@ def test_ports_have_lasting_names(tmp_path, monkeypatch):
     assert (first.device, first.usb) == ("/dev/ttyUSB7", "0403:6014")
     assert first.by_id == str(tmp_path / "usb-FTDI-if00")
     assert (second.usb, second.by_id) == ("", None)
+    paths = "/dev/ttyUSB7", "/dev/ttyS0", "/dev/none"
+    assert [usb_id_of(path, (first, second)) for path in paths] == ["0403:6014", "", ""]

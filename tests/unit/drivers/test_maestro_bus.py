@@ -68,7 +68,8 @@ def test_what_cannot_be_used_is_named_with_its_cause():
     "setup",
     [
         SETUPS[0]._replace(id=12),
-        SETUPS[0]._replace(min_steps=0),
+        SETUPS[0]._replace(min_steps=255),
+        SETUPS[0]._replace(max_steps=16_321),
         SETUPS[0]._replace(min_steps=7000, max_steps=6000),
     ],
 )

@@ -269,6 +269,16 @@ def test_a_bus_that_cannot_be_opened_is_named_with_its_cure(world, kernel, code,
     assert "\n" not in str(caught.value)
 
 
+def test_an_adapter_is_locked_and_waits_no_second_for_a_stuck_line(kernel, world, monkeypatch):
+    """The requests of the kernel's i2c-dev: 10 ms units in 0702, tries in 0701."""
+    done = []
+    monkeypatch.setattr(kernel.bus, "fd", 5)
+    monkeypatch.setattr(i2c_port.fcntl, "flock", lambda *call: done.append(call))
+    monkeypatch.setattr(i2c_port.fcntl, "ioctl", lambda *call: done.append(call))
+    world.bus.open()
+    assert done == [(5, 2 | 4), (5, 0x0702, 2), (5, 0x0701, 1)]
+
+
 def test_a_path_says_what_kind_of_port_it_is(tmp_path):
     assert isinstance(port_at_path("/dev/i2c-1"), I2cPort)
     assert isinstance(port_at_path("/dev/ttyUSB0"), BlockingPort)

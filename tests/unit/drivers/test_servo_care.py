@@ -46,6 +46,12 @@ def test_such_a_servo_is_named_and_all_are_left_without_torque(xl, spoil, error,
     assert not any(servo.torque for servo in xl.chain.servos)
 
 
+def test_no_torque_while_settings_cannot_be_read(xl):
+    xl.port.spoil = lambda code, raw: b"" if xl.sent[-1][8] == 44 else raw
+    with pytest.raises(ServoMissing, match="no answer from servo 1, servo 2, servo 3: check"):
+        xl.bus.enable_torque()
+
+
 @pytest.mark.parametrize("turn", [4096, -4096])
 def test_a_position_that_wraps_as_the_torque_comes_on_is_found(xl, turn):
     servo = xl.chain[2]

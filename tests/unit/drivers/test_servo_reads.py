@@ -6,12 +6,10 @@ from typing import Any
 import pytest
 
 from gazerig.drivers.dynamixel.family import DYNAMIXEL
-from gazerig.drivers.event_log import EventLog
 from gazerig.drivers.feetech.family import FEETECH
 from gazerig.drivers.feetech.protocol import checksum
-from gazerig.drivers.process.host_lateness import HostLateness
 from gazerig.drivers.servo_bus.feedback import FeedbackColumns
-from gazerig.drivers.servo_bus.poll_list import AGAIN_S, PollList, silent_servos
+from gazerig.drivers.servo_bus.poll_list import silent_servos
 from gazerig.drivers.servo_bus.sync_read import GroupRead
 from gazerig.drivers.servo_bus.transaction import sort_answers
 from gazerig.drivers.types import ServoConfig
@@ -114,7 +112,12 @@ def test_twice_the_same_is_an_echo_and_two_that_differ_are_nobodys():
 
 def sts_answer(*positions, velocity=0, load=0, error=0, bits=0, warm=31):
     """Return an answer of STS servos 1, 2 ...; words have separate sign bits."""
-    params = [struct.pack("<HHHBBxB", p, velocity, load, 74, warm, bits) for p in positions]
+    # Only the first one pushes.
+    loads = load, *[0] * len(positions)
+    params = [
+        struct.pack("<HHHBBxB", *moved, 74, warm, bits)
+        for moved in zip(positions, [velocity] * len(positions), loads, strict=False)
+    ]
     return b"".join(sts_status(i, data, error) for i, data in enumerate(params, 1))
 
 
@@ -156,22 +159,3 @@ def test_an_answer_in_which_anything_is_amiss_is_looked_at(amiss):
 )
 def test_only_those_who_kept_silent_themselves_are_blamed(heard, blamed):
     assert silent_servos(IDS, heard) == blamed
-
-
-def poll_list():
-    return PollList({i: f"servo {i}" for i in IDS}, EventLog(), HostLateness())
-
-
-def test_silent_servos_are_read_at_once_then_in_turn():
-    polled = poll_list()
-    polled.record_failure(1, 10.0)
-    assert (polled.group, polled.next_due(10.0)) == ((4, 9), 1)
-    polled.record_failure(1, 10.0)
-    assert (polled.next_due(10.0), polled.next_due(10.0 + AGAIN_S)) == (None, 1)
-    polled.record_failure(9, 10.1)
-    polled.record_failure(9, 10.1)
-    assert (polled.next_due(10.2), polled.next_due(10.1 + AGAIN_S), polled.group) == (None, 1, (4,))
-    polled.record_answer(1)  # the other one may be back, too
-    assert (polled.group, polled.next_due(10.25)) == ((4, 1), 9)
-    polled.record_answer(9)
-    assert (polled.group, polled.next_due(11.0)) == (IDS, None)

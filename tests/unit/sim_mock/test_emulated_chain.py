@@ -7,6 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from servo_bench import ALL, MAKES, PING, SYNC_READ
 
+from gazerig.sim_mock.replies import merge
+
 
 @pytest.fixture(params=MAKES, ids=lambda make: make.model)
 def make(request):
@@ -31,7 +33,7 @@ def answered(bench, *ids):
 # --- framing
 
 
-@pytest.mark.parametrize("noise", [b"\xff", b"\xff\xff\xfd\x00"], ids=repr)
+@pytest.mark.parametrize("noise", [b"\xff", b"\xff\xff\x01", b"\xff\xff\xfd\x00"], ids=repr)
 def test_noise_before_an_instruction_is_passed_over(make, noise):
     bench = bench_of(make)
     bench.chain.receive(noise)
@@ -58,6 +60,10 @@ def test_a_torn_instruction_is_forgotten_after_the_gap(make):
 def test_a_silent_one_silences_those_behind_it(make):
     bench = bench_of(make, (1, 2, 3))
     assert [piece.servo_id for piece in answered(bench, 1, 8, 2, 3)] == [1]
+
+
+def test_who_sends_at_the_same_time_pulls_the_line_down():
+    assert merge(b"\x0f\x01", b"\xf3") == merge(b"\xf3", b"\x0f\x01") == b"\x03\x01"
 
 
 # --- status

@@ -85,7 +85,7 @@ led 2
 id 253
 id 1
 goal_pwm 886
-position_i_gain 500
+position_i_gain 2000
 velocity_limit 2048
 """
     + COMMON
@@ -166,7 +166,9 @@ wait 0.1
 wait 1
 do stick 1
 goal_position 500
+do voltage 1 9
 wait 2.2
+do voltage 1 6
 do free 1
 wait 0.5
 goal_position 505

@@ -60,6 +60,13 @@ def test_an_echo_and_noise_on_all_bytes(world):
     world.faults.command("echo")
     assert world.raw().endswith(whole) and len(world.raw()) > len(whole)
     world.faults.command("clear")
+    for percent, kept in ((100, 1000), (20, 3400)):
+        # Of each four bytes hit two are changed, one is lost, one follows another.
+        world.faults.command(f"static {percent} for 1")
+        noisy = world.faults.add_noise(bytes(4000))
+        assert len(noisy) == pytest.approx(4000, abs=150)
+        assert noisy.count(0) == pytest.approx(kept, abs=100)
+        world.faults.command("clear")
     world.faults.command("static 100 for 1")
     assert world.raw() != whole
     world.now_s += 1.0

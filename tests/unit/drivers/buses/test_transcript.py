@@ -17,7 +17,8 @@ from gazerig.drivers.errors import DriverError
 
 GOLDEN = Path(__file__).parents[3] / "golden" / "bus_transcript.txt"
 
-SMART = """0.35 3
+SMART = """0.5 2
+0.35 3 hold
 0.45 6
 0.45 20 lose {b} count 3
 0.45 4 lose all count 2
@@ -25,21 +26,41 @@ SMART = """0.35 3
 0.45 4 truncate {c} 7 count 2
 0.45 8 delay {b} 9 count 3
 0.45 3 echo
-0.45 60 brown-out {a}
-0.6 8
-0.6 60 overload {c}
+0.45 50 brown-out {a}
+0.6 8 pause 0.5
+0.6 25 overload {c}
 0.6 5 temperature {a} 90
 0.6 60 temperature {a} 40
 0.6 9 turn {b} 300
 0.6 20 unplug for 0.1
-0.6 40 pause
+0.6 30 pause 0.5
+0.6 2 brown-out {d}
+0.6 2 turn {d} -1500
+0.6 20 pause 1
+0.6 2 brown-out {b}
+0.6 9 pause 4
+0.6 2 brown-out {b}
+0.6 9 pause 4
+0.6 2 brown-out {b}
+0.6 9 pause 4
+0.6 2 brown-out {b}
+0.6 9 pause 1
+0.6 2 brown-out {b}
+0.6 9 pause 1
+0.6 2 brown-out {b}
+0.6 9 pause 1
 0.6 9 release
 0.6 9 narrow
+0.6 2 brown-out {a}
+0.6 2 brown-out {c}
+0.6 2 pause 1
+0.6 20 hold
 0.6 2 voltage {a} 3
 0.6 2 release"""
 """Goals as shares of the range, ticks, and the command that comes before them."""
 
-BOARD = """0.35 3
+BOARD = """0.5 2
+0.35 3 hold
 0.6 20
 0.6 8 lose all count 3
 0.6 8 corrupt all 9 count 3
@@ -47,7 +68,7 @@ BOARD = """0.35 3
 0.6 8 delay all 25 count 3
 0.6 30 brown-out
 0.6 20 unplug for 0.1
-0.6 20 pause
+0.6 20 pause 0.5
 0.6 9 release
 0.6 30 narrow
 0.6 8 lose-writes 2
@@ -87,7 +108,6 @@ def transcript(name):
     port.write, port.read_until = noted_write, noted_read  # type: ignore[method-assign]
     ids = dict(zip("abcd", (setup.id for setup in bench.setups), strict=True))
     attempt(bus.open)
-    attempt(bus.enable_torque)
     yield "open", noted
     for line in (BOARD if name in BOARDS else SMART).splitlines():
         share, ticks, *words = line.split(" ", 2)
@@ -95,13 +115,23 @@ def transcript(name):
         noted = []
         if command == "narrow":
             low, high = bench.steps([0.5, 0.55])
-            narrow = [s._replace(min_steps=low, max_steps=high) for s in bench.setups]
-            bus.retune(narrow)  # type: ignore[attr-defined]
+            inner = [
+                s._replace(
+                    min_steps=low,
+                    max_steps=high,
+                    gains=(30, 2, 20),
+                    strength=0.5,
+                    max_accel_steps_s2=9e3,
+                )
+                for s in bench.setups
+            ]
+            bus.retune(inner)  # type: ignore[attr-defined]
+        if command in ("hold", "narrow"):
             attempt(bus.enable_torque)
         elif command == "release":
             attempt(bus.disable_torque)
-        elif command == "pause":
-            bench.wait(0.5)
+        elif command.startswith("pause"):
+            bench.wait(float(command[6:]))
         elif command:
             bench.command(command)
         for _ in range(int(ticks)):
