@@ -45,31 +45,6 @@ def played(made: Run, track: str) -> tuple[CommandReply, list[Tick]]:
     return reply, first + ticks(made, int(reply.track.duration_s / DT) + 30, DT)
 
 
-def test_joints_follow_tracks_and_the_eyes_stay_on_the_point(started: Callable[[Rig], Run]):
-    for name, tracks in (("desk", ("nod", "look_around")), ("expressive", ("shake", "laugh"))):
-        rig = steady(name)
-        made = started(rig)
-        lids = np.array([joint.endswith("lid") for joint in rig.names])
-        made.robot.command(LookAt(POINT, who="test", stay=True))
-        before = ticks(made, 200, DT)[-1]
-        for track in tracks:
-            _, done = played(made, track)
-            desired = np.array([tick.desired_rad for tick in done])
-            commanded = np.array([tick.guard_result.command_rad for tick in done])
-            measured = np.array([tick.joints.position_rad for tick in done])
-            # A blink may come in between and ask for more than a lid can do; nothing else may.
-            assert np.array_equal(desired[:, ~lids], commanded[:, ~lids])
-            moved = np.ptp(commanded[:, ~lids], axis=0)
-            assert degrees(moved.max()) > 4.0, track
-            behind = np.abs(commanded - measured)[:, ~lids].max(axis=0)
-            assert degrees(behind.max()) < 7.0 and (behind < 0.75 * moved + 0.02).all(), track
-            assert np.abs(desired[-1] - before.desired_rad)[~lids].max() < np.radians(0.1)
-            if track != "look_around":
-                fixed = "eyes_pan" not in rig.names
-                errors = [degrees(gaze_error(POINT, tick.pose, fixed)) for tick in done]
-                assert max(errors) < 1.0, track
-
-
 OWNED = """\
 description: own neck and jaw
 owns: [neck, jaw]

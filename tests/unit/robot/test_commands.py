@@ -37,7 +37,6 @@ from gazerig.robot.model.commands import (
     read_request,
 )
 from gazerig.robot.model.reply import (
-    NO_CLIENT_CONTROL,
     ControlSource,
     control_sentence,
 )
@@ -131,8 +130,10 @@ def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(
 
 
 def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running):
+    running.order(Resume())  # of nothing
     running.order(Stop("test"))
     before = running.go(2.0)[-1]
+    assert not any("torque on" in event for tick in running.ticks for event in tick.events)
     running.order(Resume())
     ticks = running.go(3.0)
     assert not ticks[0].stopped and all(ticks[2].joints.torque)
@@ -166,15 +167,6 @@ def test_a_stop_while_parking_is_obeyed_at_once(running: Running):
     assert made.clock.now_s() - began_s < 0.011
     joints = robot.body.read(made.clock.now_s())
     assert not any(joints.torque) and degrees(joints.position_rad[YAW]) > 45.0
-
-
-def test_two_stops_are_one_and_a_resume_of_nothing_is_nothing(running: Running):
-    running.order(Resume())
-    assert not any("torque" in e for tick in running.go(0.1) for e in tick.events)
-    running.order(Stop("one"))
-    running.order(Stop("two"))
-    tick = running.go(0.1)[0]
-    assert sum("stopped" in event for event in tick.events) == 1
 
 
 def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running):
@@ -211,41 +203,6 @@ def test_unknown_menus_are_refused_when_asked(running: Running):
 def replied(running: Running, order: Command) -> str:
     """Ask, run on, and give why it was refused."""
     return running.do(order)[0].refused
-
-
-def test_a_stop_holds_two_seconds_whoever_asks(running: Running):
-    running.order(Stop("a hand", who="browser 1"))
-    running.go(0.5)
-    assert "lasts at least 2 s: try again in 1.5 s" in replied(
-        running, Resume(who="browser 1", confirmed=True)
-    )
-    running.go(1.6)
-    assert replied(running, Resume(who="browser 1")) == "" and not running.made.robot.stopped
-
-
-def test_another_resumes_only_who_confirms(running: Running):
-    for who in ("browser 1", "browser 2"):
-        running.order(Stop("a hand", who=who))
-    running.go(2.1)
-    by = "stopped by browser 1 and browser 2: another client must confirm"
-    for command in (Resume(who="browser 2"), Resume()):
-        assert by in replied(running, command)
-    assert running.made.robot.stopped
-    ticket = running.made.robot.command(Resume(who="browser 2", confirmed=True))
-    tick = running.go()[0]
-    assert ticket.wait(0.0) is not None and not tick.stopped
-    assert any("torque on again by browser 2" in event for event in tick.events)
-
-
-@pytest.mark.parametrize("confirmed", [False, True])
-def test_a_flood_of_resumes_beats_no_stop(running: Running, confirmed: bool):
-    running.order(Stop("a hand", who="browser 1"))
-    events: list[str] = []
-    for _ in range(700):  # 3.5 s, one a tick
-        running.order(Resume(who="a loop", confirmed=confirmed))
-        events += [event for tick in running.go() for event in tick.events]
-    assert running.made.robot.stopped == "a hand"
-    assert len([event for event in events if "resume" in event]) < 10
 
 
 def test_a_command_is_replied_to_when_its_tick_can_be_seen(running: Running):
@@ -294,18 +251,6 @@ def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running):
         in words
     )
     assert fastest_rad_s(ticks)[YAW] <= GENTLE_RAD_S * 1.01
-
-
-def test_a_lead_holds_while_it_is_renewed_by_the_one_who_leads(running: Running):
-    running.order(LookAt((1.2, 0.6, 0.3), who="a show"))
-    for _ in range(5):
-        running.go(0.5)
-        assert replied(running, Renew(who="a show")) == ""
-    assert running.ticks[-1].controlled_by == "a show: look at 1.2 0.6 0.3"
-    for _ in range(4):
-        assert "no longer control" in replied(running, Renew(who="another"))
-        running.go(0.4)
-    assert running.ticks[-1].controlled_by == "" and running.ticks[-1].target.kind == "face"
 
 
 # Floods
@@ -392,27 +337,6 @@ def test_a_pixel_without_a_frame_is_refused(running: Running):
     running.made.robot.camera.latest = nothing  # type: ignore[method-assign]
     running.go()
     assert "no camera frame" in running.do(LookAtPixel((1.0, 1.0)))[0].refused
-
-
-def test_leads_are_counted_and_their_ends_have_reasons(running: Running):
-    assert running.go()[-1].client_control == NO_CLIENT_CONTROL
-    assert running.do(LookAt((1.0, 0.0, 0.3), stay=True))[0].control_number == 1
-    reply, ticks = running.do(LookAt((1.0, 0.4, 0.3), stay=True), 1.5)
-    assert (
-        reply.control_number == 2
-        and ticks[0].client_control.number == 2
-        and not ticks[0].client_control.arrived
-    )
-    assert ticks[-1].client_control.arrived
-    free = running.do(LookAt(None, who="a show"))
-    assert (
-        free[0].control_number == 0
-        and free[1][-1].client_control.end_reason == "a show looks elsewhere"
-    )
-    reply, ticks = running.do(Jog((("neck_yaw", radians(20.0)),), stay=True), 0.1)
-    assert reply.control_number == 3 and degrees(ticks[0].client_control.error_rad) > 3.0
-    assert running.go(2.0)[-1].client_control.arrived
-    assert running.do(Stop("a hand"))[1][-1].client_control.end_reason == "stopped: a hand"
 
 
 # ---- The source of control of the head is one value with the same words everywhere.

@@ -1,60 +1,118 @@
 """Events of gaze, people and tracks are those of the ticks, each once and in order."""
 
-from pathlib import Path
-from typing import get_args
+from unittest.mock import Mock
 
 import pytest
-from commanded_robot import running_desk
-from slow_rigs import at_rate
+from gaze_targets import target
+from made_ticks import made_tick
+from msgspec.structs import replace
 
-import gazerig
-from gazerig.robot.loop.events import EventKind, TickFeed
-from gazerig.robot.model.commands import Play
+from gazerig.gaze.attention.addressing import Addressing
+from gazerig.gaze.types import FIRST_THING, ORDERED, Face, Percept
+from gazerig.robot.loop.events import TickFeed
+from gazerig.robot.loop.head_state import HeadReport
+from gazerig.robot.model.reply import Progress, TrackState
 
-SCENE = """\
-description: a person leaves and returns
-room: none
-round_s: 12.0
-places: {front: {x_m: 1.0, y_m: 0.0, height_m: 1.2}, away: {x_m: -1.5, y_m: -2.6, height_m: 1.2}}
-people:
-  visitor:
-    start: front
-    acts: [{at_s: 1.0, do: step, to: away, for_s: 1.0}, {at_s: 6.0, do: step, to: front, for_s: 1.0}]
-"""
-
-pytestmark = pytest.mark.usefixtures("ideal_servos")
+TARGETS = {
+    1: target(), 2: replace(target(id=2), part="LE"), 3: target(kind="thing", id=FIRST_THING),
+    4: target(kind=ORDERED, id=-1), 6: replace(target(), part="M"),
+}  # fmt: skip
+"""Faces without and with a part, a moving thing, a point of a client."""
+Eyes = tuple[str, int, bool, int]
+"""Phase, number of saccades, whether a blink is in progress, and target."""
 
 
-def test_every_saccade_blink_and_track_of_the_ticks_is_an_event():
+@pytest.mark.parametrize(
+    ("before", "after", "found"),
+    [
+        (("fixate", 3, False, 1), ("saccade", 4, False, 1),
+         [("saccade to face 1", "saccade_start", "face 1")]),
+        (("saccade", 4, False, 1), ("saccade", 4, False, 1), []),
+        (("saccade", 4, False, 1), ("pursue", 4, False, 1),
+         [("the eyes land at face 1", "saccade_landing", "face 1")]),
+        (("saccade", 4, True, 1), ("saccade", 5, True, 2),
+         [("the eyes land at face 1", "saccade_landing", "face 1"),
+          ("the target is face 2: left eye", "target", "face 2: left eye"),
+          ("saccade to face 2: left eye", "saccade_start", "face 2: left eye")]),
+        (("pursue", 5, False, 1), ("fixate", 5, True, 3),
+         [("the target is motion 1", "target", "motion 1"), ("blink", "blink", "")]),
+        (("fixate", 5, True, 1), ("fixate", 5, True, 6),
+         [("the target is face 1: mouth", "target", "face 1: mouth")]),
+        (("fixate", 5, True, 1), ("fixate", 5, True, 4),
+         [("the target is the chosen point", "target", ORDERED)]),
+    ],
+)  # fmt: skip
+def test_what_changes_between_two_ticks_is_an_event(before: Eyes, after: Eyes, found: list[object]):
     feed = TickFeed()
-    with running_desk() as running:
-        ticks = running.go(4.0)
-        running.order(Play("nod"))
-        ticks += running.go(4.0)
-    for tick in ticks:
+    ticks = [
+        made_tick(0.1 * n, gaze={"phase": phase, "saccades": count, "blink": blink},
+                  seen=TARGETS[number])
+        for n, (phase, count, blink, number) in enumerate((before, after))
+    ]  # fmt: skip
+    for tick in (*ticks, replace(ticks[0], parking=True)):
         feed.update(tick)
-    found = [event for event in feed.events() if event.kind != "message"]
-    times = {kind: [e.t_s for e in found if e.kind == kind] for kind in get_args(EventKind)}
-    saccades = ticks[-1].gaze.saccades - ticks[0].gaze.saccades
-    assert saccades > 8 and abs(len(times["saccade_start"]) - saccades) <= 1
-    pairs = list(zip(times["saccade_start"], times["saccade_landing"], strict=False))
-    assert len(pairs) >= saccades - 1
-    assert all(0.0 < landing - start < 0.3 for start, landing in pairs)
-    blinks = sum(b.gaze.blink > a.gaze.blink for a, b in zip(ticks, ticks[1:], strict=False))
-    assert len(times["blink"]) == blinks > 0
-    assert [e.subject for e in found if e.kind == "track_finished"] == ["nod"]
-    numbers = [event.number for event in feed.events()]
-    assert numbers == list(range(1, len(numbers) + 1))
-    assert [e.number for e in feed.events(numbers[-3])] == numbers[-2:]
+    assert [(e.text, e.kind, e.subject) for e in feed.events()] == found
+    assert [(e.number, e.t_s) for e in feed.events()] == [(n + 1, 0.1) for n in range(len(found))]
+    assert [e.number for e in feed.events(1)] == [n + 2 for n in range(len(found) - 1)]
+    assert (feed.number, feed.ticks) == (len(found), 3)
 
 
-def test_people_arrive_and_leave_once(tmp_path: Path):
-    (scene := tmp_path / "quick.yaml").write_text(SCENE)
-    with gazerig.open(at_rate(tmp_path, "desk", 50.0), fast=True, scene=str(scene)) as head:
-        head.step(9.0)
-        events = list(head.events(0.0, kinds=("person_arrived", "person_left", "target")))
-        texts = [event.text for event in head.events(0.0)]
-    turns = [e.kind for e in events if e.subject == 1 and e.kind != "target"]
-    assert turns == ["person_arrived", "person_left", "person_arrived"]
-    assert any(e.kind == "target" and str(e.subject).startswith("face ") for e in events)
-    assert not {e.text for e in events} & set(texts)
+CUES = (("a", 0.0), ("b", 1.0), ("c", 2.0))
+
+
+@pytest.mark.parametrize(
+    ("before_s", "now_s", "end", "found"),
+    [
+        (None, 0.0, "", ["nod passes the cue a"]),
+        (0.0, 0.999, "", []),
+        (0.999, 1.0, "", ["nod passes the cue b"]),
+        (1.0, 1.5, "", []),
+        (
+            0.5,
+            2.0,
+            "finished",
+            ["nod passes the cue b", "nod passes the cue c", "nod has finished"],
+        ),
+        (1.5, 0.5, "", ["nod passes the cue a", "nod passes the cue c"]),  # it has begun again
+        (1.5, 1.6, "somebody has ended it", ["nod ended: somebody has ended it"]),
+        (None, 0.5, "finished", []),
+    ],
+)
+def test_cues_and_ends_of_tracks_are_events(
+    before_s: float | None, now_s: float, end: str, found: list[str]
+):
+    feed, track = TickFeed(), TrackState("nod", cues=CUES, number=7)
+    other = TrackState("shake", number=6)
+    before = () if before_s is None else (replace(track, position_s=before_s),)
+    now = replace(track, position_s=now_s, end_reason=end)
+    feed.update(made_tick(tracks=(other, *before)))
+    assert feed.progress().tracks == (other, *before)
+    for _ in range(2):
+        feed.update(made_tick(tracks=(other, now)))
+    assert [event.text for event in feed.events()] == found
+    assert {e.subject for e in feed.events()} <= {"a", "b", "c", "nod"}
+
+
+def test_people_and_messages_are_events():
+    feed, follower = TickFeed(), Mock(side_effect=[False, True])
+    assert feed.report(0) == HeadReport(None, ()) and feed.progress() == Progress()
+    feed.follow(follower)
+    nobody, axes = (0.0,) * 3, ((1.0, 0.0, 0.0),) * 3
+    sees = Percept(0.0, faces=(Face(4, nobody, nobody, axes, (nobody,) * 8, 1.0),))
+    for t_s, who, percept, events in (
+        (0.0, None, None, ()), (0.1, 0, None, ()), (0.2, 0, sees, ()), (0.3, 1, sees, ("bus ok",)),
+        (2.2, None, None, ()), (2.4, None, None, ()),
+    ):  # fmt: skip
+        addressed = () if who is None else (Addressing(who, 0.0, 1.0),)
+        feed.update(made_tick(t_s, addressed=addressed, percept=percept, events=events))
+    assert [(e.text, e.kind, e.subject) for e in feed.events()] == [
+        ("person 0 addresses the head", "addressed", 0),
+        ("person 4 has arrived", "person_arrived", 4),
+        ("bus ok", "message", ""),
+        ("person 1 addresses the head", "addressed", 1),
+        ("person 1 no longer addresses the head", "addressed", ""),
+        ("person 4 has left", "person_left", 4),
+    ]
+    assert feed.messages() == feed.events()[2:3] == feed.report(2).events[:1]
+    assert follower.call_count == 2 and feed.report(6).number == 6
+    assert feed.wait_for_ticks(0, 0.0) and not feed.wait_for_ticks(1, 0.004)

@@ -3,7 +3,7 @@
 import random
 from collections.abc import Callable
 from dataclasses import replace
-from math import copysign, radians
+from math import radians
 from types import SimpleNamespace
 from typing import Any
 
@@ -27,7 +27,6 @@ from gazerig.robot.model.types import GuardResult
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.perception.tracker import Tracker
 from gazerig.robot.run.run import Run
-from gazerig.robot.safety.guard import SOFT_START_RAD_S2
 
 
 def ticks(assembly: Run, seconds: float) -> list[Tick]:
@@ -37,27 +36,16 @@ def ticks(assembly: Run, seconds: float) -> list[Tick]:
     return seen
 
 
-def test_it_starts_slowly_from_where_the_joints_are():
-    # The face is within comfort of the eyes, where the head stays unless it goes with the eyes.
-    rig = load_rig("desk")
-    head = replace(rig.gaze.head, eye_only_range_deg=0.0)
-    rig = replace(rig, gaze=replace(rig.gaze, head=head))
-    seen = ticks(simulated(rig), 3.0)
-    neck = np.degrees([tick.joints.position_rad[6] for tick in seen])
-    eye = np.degrees([tick.joints.position_rad[0] for tick in seen])
-    assert neck[0] == pytest.approx(-12.0, abs=0.1)
-    assert eye[0] == pytest.approx(6.0, abs=0.1)
-    # One servo step in a tick is 18 deg/s; a saccade would reach 500.
-    assert np.abs(eye[2:190] - eye[:188]).max() / 0.010 < 60.0 + 18.0
-    assert abs(neck[-1]) < 8.0
-
-
 def test_every_goal_on_the_bus_is_inside_the_limits():
     rig = load_rig("desk")
     rig = replace(rig, loop=replace(rig.loop, rate_hz=100.0))
     run_of = simulated(rig, seed=3, bus="ideal")
-    commands = np.array([tick.guard_result.command_rad for tick in ticks(run_of, 15.0)])
+    seen = ticks(run_of, 15.0)
+    commands = np.array([tick.guard_result.command_rad for tick in seen])
+    assert np.degrees(commands[0, [0, 6]]) == pytest.approx([6.0, -12.0], abs=0.2)
     speeds = np.diff(commands, axis=0) / 0.010
+    # It starts slowly from where the joints are; a saccade would reach 500 deg/s.
+    assert np.abs(speeds[:20]).max() <= radians(60.0) + 1e-6
     for i, name in enumerate(GAZE_JOINTS):
         limit = rig.joints[name].limit()
         assert commands[:, i].min() >= limit.low_rad and commands[:, i].max() <= limit.high_rad
@@ -262,7 +250,6 @@ def test_it_parks_in_time_on_a_host_that_is_late(name: str, host: str):
     made.close()
 
     slow = radians(rig.guard.soft_start_speed_deg_s)
-    soft = SOFT_START_RAD_S2
     times, commands = map(np.array, zip(*sent, strict=True))
     gap_s = np.diff(times, prepend=times[0])
     for i, (limit, park_rad) in enumerate(zip(limits, made.park_rad, strict=True)):
@@ -274,15 +261,3 @@ def test_it_parks_in_time_on_a_host_that_is_late(name: str, host: str):
         for k in far[1:]:  # no farther than the slow speed reaches in the passed time
             last = abs(step[k - 1]) / gap_s[k - 1]
             assert abs(step[k]) / gap_s[k] <= max(slow, last) + 1e-6
-        if host != "never four times":
-            continue
-        # One tick in four comes in time: each moves joints for one slot, from what is left of
-        # their speed. That is regained with the joint's own acceleration, and no more than that.
-        speed = step / period_s
-        fastest = abs(speed[1])
-        for k in far[1:]:
-            lost = limit.accel_rad_s2 * (gap_s[k] - period_s)
-            left = copysign(max(0.0, abs(speed[k - 1]) - lost), speed[k - 1])
-            assert abs(speed[k] - left) <= limit.accel_rad_s2 * period_s + 1e-6
-            assert abs(speed[k]) <= max(abs(left), min(slow, fastest + soft * period_s)) + 1e-6
-            fastest = max(fastest, abs(speed[k]))

@@ -1,46 +1,60 @@
-"""Figures of the loop's time, from the times of its ticks."""
+"""Figures of the loop's time, from the times of its ticks; the interpreter's switch interval."""
+
+import sys
+from collections.abc import Sequence
 
 import pytest
 
-from gazerig.robot.loop.timing import LoopTiming, busy_text
+from gazerig.robot.loop.timing import LoopTiming, SwitchInterval, busy_text
 from gazerig.robot.model.types import LoopFigures
 
 
-def timed(times_s: list[float], rate_hz: float = 200.0) -> LoopFigures:
+def timed(times_s: Sequence[float], rate_hz: float = 200.0) -> LoopFigures | None:
     timing = LoopTiming(rate_hz)
     for t_s in times_s:
         timing.update(t_s)
-    figures = timing.figures()
-    assert figures is not None
-    return figures
+    return timing.figures()
 
 
-def test_a_loop_that_keeps_its_slots_has_no_late_tick():
-    figures = timed([0.005 * k for k in range(400)])
-    assert figures.rate_hz == pytest.approx(200.0)
-    assert figures.latest_ms == pytest.approx(0.0, abs=1e-6)
-    assert figures.overruns == 0
+SLOTS = [0.005 * k for k in range(2000)]
+LATE = [t_s + 0.0015 * (k == 200) for k, t_s in enumerate(SLOTS[:400])]
+SKIPPED = [SLOTS[k] for k in range(200) if k not in (50, 51, 120)]
+STALLS = [SLOTS[k] for k in range(800) if not 100 <= k % 200 < 116]  # 80 ms, four times
 
 
-def test_a_late_tick_shows_and_is_no_overrun():
-    times = [0.005 * k for k in range(400)]
-    times[200] += 0.0015
-    figures = timed(times)
-    assert figures.latest_ms == pytest.approx(1.5, abs=1e-6)
-    assert figures.overruns == 0
-
-
-def test_skipped_slots_are_overruns():
-    times = [0.005 * k for k in range(200) if k not in (50, 51, 120)]
-    figures = timed(times)
-    assert figures.overruns == 3
-    assert figures.latest_ms == pytest.approx(10.0)
+@pytest.mark.parametrize(
+    ("times_s", "figures"),
+    [
+        (SLOTS[:1], None),
+        (SLOTS[:2], (200.0, 0, 0.0, 0.0, 0.0)),
+        (SLOTS[:400], (200.0, 0, 1.99, 0.0, 0.0)),
+        (SLOTS, (200.0, 0, 4.995, 0.0, 0.0)),  # 1000 of them are in the last five seconds
+        ([*SLOTS[:400], 1.0, 1.006, 1.011], (200.0, 0, 0.005, 0.0, 1.0)),  # another clock
+        (LATE, (200.0, 0, 1.99, 0.0, 1.5)),
+        (SKIPPED, (195 / 0.99, 3, 0.99, 3 / 199, 10.0)),
+        (STALLS, (734 / 3.99, 64, 3.99, 64 / 799, 80.0)),
+    ],
+)
+def test_ticks_are_counted_late_or_skipped(times_s: list[float], figures: tuple[float, ...] | None):
+    found = timed(times_s)
+    if figures is None or found is None:
+        assert found is figures
+        return
+    assert (found.rate_hz, found.overruns, found.over_s) == pytest.approx(figures[:3])
+    assert (found.late_share, found.latest_ms) == pytest.approx(figures[3:], abs=1e-6)
 
 
 def test_a_computer_that_misses_slots_is_called_busy_with_its_figures():
-    assert busy_text(None) == "" and busy_text(timed([0.005 * k for k in range(400)])) == ""
-    times = [0.005 * k for k in range(800) if not 100 <= k % 200 < 116]  # 80 ms, four times
-    figures = timed(times)
-    assert figures.late_share == pytest.approx(64 / 799)
-    assert busy_text(figures) == ("the computer is too busy: 8% of ticks came late (worst 80 ms)")
-    assert busy_text(timed(times[:500])) == ""  # below three seconds a lower rate may help
+    assert busy_text(None) == busy_text(timed(SLOTS)) == busy_text(timed(STALLS[:500])) == ""
+    said = "the computer is too busy: {}% of ticks came late (worst 60 ms)".format
+    for over_s, share, text in ((3.0, 0.05, said(5)), (2.99, 0.05, ""), (3.0, 0.049, "")):
+        assert busy_text(LoopFigures(200.0, 1, over_s, share, 60.0)) == text
+
+
+def test_the_interpreter_switches_threads_sooner_while_a_loop_runs():
+    before, loops, found = sys.getswitchinterval(), SwitchInterval(), []
+    with loops:
+        with loops:
+            found.append(sys.getswitchinterval())
+        found.append(sys.getswitchinterval())
+    assert found == pytest.approx([0.0003] * 2) and sys.getswitchinterval() == before

@@ -1,22 +1,16 @@
-"""A part of a package that fails ends the run, named and with torque off; one that hangs limps."""
+"""A part of a package that fails ends the run, named and with torque off."""
 
 import json
-import subprocess
-import threading
-import time
 from collections.abc import Callable, Iterator
-from functools import partial
 from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from branch import Branch
-from loop_deaths import PATIENCE_S, Driven, rig_of
+from loop_deaths import rig_of
 from outside_bus import HEAD, install_example
 from outside_package import install, on_path
-from slow_rigs import at_rate
 
 import gazerig
 from gazerig.config.parameters import apply_changes
@@ -134,50 +128,6 @@ def test_a_rule_that_returns_no_point_ends_the_run():
             gazerig.open("desk", fast=True, attention=rule) as head,
         ):
             head.sleep(1.0)
-
-
-# --- parts that hang
-
-
-def wait(*_: object) -> None:
-    threading.Event().wait()
-
-
-class Hanging:
-    """A rule that hangs after some ticks."""
-
-    ticks = 0
-
-    def choose(self, *_: object) -> Any:
-        self.ticks += 1
-        if self.ticks == 10:
-            print("moving", flush=True)
-        if self.ticks > 25:
-            wait()
-
-
-def _hang(path: str, file: str) -> None:
-    with gazerig.open(file, port=path, attention=Hanging(), say=lambda line: None):
-        time.sleep(2.0 * PATIENCE_S)
-
-
-def test_a_rule_that_hangs_leaves_limp_servos(tmp_path: Path):
-    file = at_rate(tmp_path, "feetech", 50.0)
-    rig = load_rig(file)
-    with PtyBuses() as buses:
-        (path,) = buses.start(emulated_lines(rig)).values()
-        loop = Branch(partial(_hang, path, file), stdout=subprocess.PIPE, text=True)
-        late = threading.Timer(2.0 * PATIENCE_S, loop.kill)
-        late.start()
-        try:
-            it = Driven(loop, buses, frozenset(joint.id for joint in rig.joints.values()))
-            it.line("moving")
-            assert any(it.holding())
-            assert it.limp_after_s(time.monotonic(), PATIENCE_S) is not None
-        finally:
-            late.cancel()
-            loop.kill()
-            loop.communicate()
 
 
 # --- values of a package's bus

@@ -35,28 +35,32 @@ class Head:
 
 
 @pytest.mark.parametrize(
-    "error", [MemoryError(), RuntimeError("x"), KeyboardInterrupt(), SystemExit(3), BusLost("gone")]
-)
-def test_whatever_ends_the_work_the_head_parks_and_torque_goes_off(error: BaseException):
-    head = Head()
+    ("error", "cause", "what"),
+    [
+        (MemoryError(), "stopped by fault: unexpected MemoryError: ", "MemoryError"),
+        (RuntimeError("x\ny"), "stopped by fault: unexpected RuntimeError: x y: ", "RuntimeError: x y"),
+        (KeyboardInterrupt(), "stopped by an interrupt: ", "interrupted"),
+        (SystemExit(3), "", "SystemExit: 3"),
+        (BusLost("gone"), "", "gone"),
+    ],
+)  # fmt: skip
+def test_whatever_ends_work_or_parking_the_torque_goes_off(
+    error: BaseException, cause: str, what: str
+):
+    head, stuck = Head(), Head()
     with pytest.raises(type(error)), head.way_out() as leaving:
-        leaving.switch_on(lambda: None)
+        assert leaving.switch_on(lambda: 7) == 7
         raise error
-    assert head.did == ["park", "off"] and len(head.said) == 1
-    assert "parked, torque off" in head.said[0]
-
-
-@pytest.mark.parametrize("error", [MemoryError(), KeyboardInterrupt(), BusLost("gone")])
-def test_parking_that_fails_does_not_keep_the_torque_on(error: BaseException):
-    head = Head()
 
     def fail() -> None:
         raise error
 
-    head.during_parking = fail
-    with head.way_out() as leaving:
+    stuck.during_parking = fail
+    with stuck.way_out() as leaving:
         leaving.switch_on(lambda: None)
-    assert head.did == ["park", "off"] and head.said[0].startswith("not parked (")
+    assert head.did == stuck.did == ["park", "off"]
+    assert head.said == [f"{cause}parked, torque off"]
+    assert stuck.said == [f"not parked ({what}), torque off"]
 
 
 def test_torque_that_cannot_be_switched_off_is_said_with_what_to_do():
@@ -86,20 +90,6 @@ def test_servos_that_do_not_confirm_are_said_even_where_success_is_not():
     assert said == [f"parked, torque off; {eyes}: torque-off not confirmed: cut it"]
 
 
-def test_a_start_that_is_refused_needs_no_end_and_one_that_breaks_off_does():
-    def refused() -> None:
-        raise SetupError("no servo")
-
-    def broken() -> None:
-        raise MemoryError
-
-    for start, did in ((refused, []), (broken, ["off"])):
-        head = Head()
-        with pytest.raises((SetupError, MemoryError)), head.way_out() as leaving:
-            leaving.switch_on(start)
-        assert head.did == did and head.said == []
-
-
 class Seconds:
     """A clock that is set."""
 
@@ -108,10 +98,53 @@ class Seconds:
     def __call__(self) -> float:
         return self.now
 
+    def insist(self) -> None:
+        for _ in range(5):
+            ask(self)
+
 
 def ask(clock: Seconds, number: signal.Signals = signal.SIGINT, after_s: float = 1.0) -> None:
     clock.now += after_s
     signal.raise_signal(number)
+
+
+def test_a_start_that_is_refused_needs_no_end_and_one_that_breaks_off_does():
+    def refused() -> None:
+        raise SetupError("no servo")
+
+    def broken() -> None:
+        raise MemoryError
+
+    for start, did in ((refused, []), (broken, ["off"])):
+        head, clock = Head(), Seconds()
+        head.while_off = clock.insist
+        with (
+            pytest.raises((SetupError, MemoryError)),
+            Interrupts(clock) as interrupts,
+            head.way_out(interrupts) as leaving,
+        ):
+            leaving.switch_on(start)
+        assert head.did == did and head.said == []
+
+
+def test_the_first_reason_to_end_stays_and_all_requests_count():
+    others = iter((None, "the page"))
+    asked = Interrupts(also=lambda: next(others))
+    assert Interrupts.from_stop(asked) is asked and asked.requests == 0
+    assert Interrupts.from_stop(lambda: "over")() == "over"
+    asked.raise_if_requested()
+    with pytest.raises(KeyboardInterrupt):
+        asked.raise_if_requested()
+    for _ in range(2):
+        asked.request("later")
+    assert asked() == "the page" and asked.requests == 3
+
+    def slow() -> str:
+        meanwhile.request("SIGTERM")
+        return "the page"
+
+    meanwhile = Interrupts(also=slow)
+    assert meanwhile() == "SIGTERM"
 
 
 def test_a_second_request_skips_parking_and_none_reaches_the_torque_off():
@@ -123,11 +156,7 @@ def test_a_second_request_skips_parking_and_none_reaches_the_torque_off():
 
     head.during_parking = skipped
 
-    def impatient() -> None:
-        for _ in range(5):
-            ask(clock)
-
-    head.while_off = impatient
+    head.while_off = clock.insist
     with Interrupts(clock) as interrupts, head.way_out(interrupts) as leaving:
         leaving.switch_on(lambda: None)
         ask(clock)

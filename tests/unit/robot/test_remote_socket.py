@@ -235,20 +235,6 @@ def test_a_loop_that_hangs_is_told_to_who_stops(
     rig.send(Resume())
 
 
-def test_a_servo_that_refuses_torque_is_named(
-    rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
-):
-    def refuse() -> None:
-        raise SetupError("neck_yaw: overload; gazerig doctor")
-
-    rig.send(Stop("test"))
-    with monkeypatch.context() as patch:
-        patch.setattr(beat.robot.body, "enable_torque", refuse)
-        with pytest.raises(RequestRejected, match="still stopped: neck_yaw: overload"):
-            rig.send(Resume())
-    rig.send(Resume())
-
-
 def test_an_error_of_the_program_is_told_to_both_sides_and_the_rest_goes_on(
     rig: RobotClient, errors: list[str], monkeypatch: pytest.MonkeyPatch
 ):

@@ -221,22 +221,13 @@ def test_an_order_that_crossed_processes_is_checked_in_its_tick():
 def test_a_joint_outside_its_new_range_is_led_inside_slowly():
     running = started()
     jog(running, "neck_yaw", 40.0, 300)
-    assert running.ticks[-1].guard_result.command_rad[6] == pytest.approx(
-        np.radians(40.0), abs=1e-3
-    )
     running.tune({"joints.neck_yaw.max_deg": 20.0, "joints.neck_yaw.min_deg": -20.0})
-    judge = Judge(running)
-    first = running.ticks[-1].guard_result.command_rad[6]
-    judge.go(1)
-    verdict = running.ticks[-1].guard_result
-    assert abs(verdict.command_rad[6] - first) < np.radians(60.0) * DT_S
-    assert "neck_yaw: outside its new range" in verdict.reasons
-    judge.go(300)
-    assert running.ticks[-1].guard_result.command_rad[6] == pytest.approx(
-        np.radians(20.0), abs=1e-3
-    )
-    speeds = np.diff([t.guard_result.command_rad[6] for t in running.ticks[-300:]]) / DT_S
-    assert np.abs(speeds).max() <= np.radians(60.0) + 1e-6
+    Judge(running).go(301)
+    results = [tick.guard_result for tick in running.ticks[-302:]]
+    assert "neck_yaw: outside its new range" in results[1].reasons
+    yaw_deg = np.degrees([result.command_rad[6] for result in results])
+    assert yaw_deg[[0, -1]] == pytest.approx([40.0, 20.0], abs=0.06)
+    assert np.abs(np.diff(yaw_deg)).max() <= 60.0 * DT_S + 1e-4
 
 
 def jog(running: Running, joint: str, deg: float, ticks: int) -> None:

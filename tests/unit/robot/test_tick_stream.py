@@ -4,11 +4,12 @@ from math import inf, nan
 
 import numpy as np
 import pytest
+from made_ticks import made_tick
 from msgspec import UNSET
-from msgspec.structs import replace
-from recorded_run import Recorded, exact, record
+from recorded_run import exact
 
-from gazerig.robot.loop.tick import TickRecord
+from gazerig.gaze.types import Percept
+from gazerig.robot.loop.tick import TickRecord, TorqueRefused
 from gazerig.robot.loop.tick_stream import (
     TickBatch,
     TickStream,
@@ -16,11 +17,6 @@ from gazerig.robot.loop.tick_stream import (
     decode,
     encode,
 )
-
-
-@pytest.fixture(scope="module")
-def recorded(tmp_path_factory: pytest.TempPathFactory) -> Recorded:
-    return record(tmp_path_factory.mktemp("runs") / "run.mcap", 0.5)
 
 
 class Sink:
@@ -43,35 +39,28 @@ def unwanted(line: str) -> None:
     raise AssertionError(line)
 
 
-def test_every_tick_is_in_one_batch_with_every_field(recorded: Recorded):
-    stream, sink = TickStream(unwanted), Sink()
+def test_every_tick_is_in_one_batch_in_time_and_a_percept_in_one_or_after_a_loss():
+    """A batch every 40 ms, and at once after a leap of the time."""
+    stream, sink, lost = TickStream(unwanted), Sink(), Sink(3)
+    seen = [Percept(1.0), Percept(nan)]
+    ticks = [made_tick(0.01 * k, percept=seen[k > 6]) for k in range(10)]
+    ticks += [made_tick(t_s, percept=seen[1], events=("x",)) for t_s in (9.0, 9.01, 1.0, 1.01)]
+    ticks[5:5] = [made_tick(0.041)]
+    stream.update(ticks[0])  # to nobody
     stream.sinks.add("test", sink.take)
-    for tick in recorded.ticks:
-        stream.update(tick)
-    stream.flush()
-    assert [batch.ticks for batch in sink.batches] == [1, *[8] * 12, 2]
-    percept, at = None, 0
-    for batch in sink.batches:
-        for one in decode(batch.data, list[TickRecord]):
-            percept = percept if one.percept is UNSET else one.percept
-            tick = recorded.ticks[at]
-            at += 1
-            assert exact(one.tick) == exact(tick)
-            assert repr(percept) == repr(tick.percept)
-        assert batch.newest.t_s == one.tick.t_s
-    assert at == len(recorded.ticks)
-
-
-def test_a_percept_is_sent_again_to_who_lost_it(recorded: Recorded):
-    tick = next(tick for tick in recorded.ticks if tick.percept is not None)
-    for refused in ((), (1,)):
-        stream, sink = TickStream(unwanted, every_s=0.0), Sink(*refused)
-        stream.sinks.add("test", sink.take)
-        for n in range(4):
-            stream.update(replace(tick, t_s=0.005 * n))
-        records = [decode(batch.data, list[TickRecord])[0] for batch in sink.batches]
-        sent = [one.percept is not UNSET for one in records]
-        assert sent == ([True, False, False] if refused else [True, False, False, False])
+    stream.sinks.add("loses", lost.take)
+    for tick in ticks[1:]:
+        stream.append(tick, tick.t_s, (TorqueRefused("x"),))
+    for _ in range(2):
+        stream.flush()
+    assert [batch.ticks for batch in sink.batches] == [4, 5, 2, 2, 1]
+    records = [one for batch in sink.batches for one in decode(batch.data, list[TickRecord])]
+    assert [batch.newest for batch in sink.batches] == [ticks[k] for k in (4, 9, 11, 13, 14)]
+    for one, tick in zip(records, ticks[1:], strict=True):
+        assert exact(one.tick) == exact(tick)
+        assert (one.dt_s, one.before) == (tick.t_s, (TorqueRefused("x"),))
+    sent = {k + 1: repr(one.percept) for k, one in enumerate(records) if one.percept is not UNSET}
+    assert sent == {5: "None", 6: repr(seen[0]), 8: repr(seen[1]), 12: repr(seen[1])}
 
 
 def test_numbers_keep_their_bits_and_their_type():
