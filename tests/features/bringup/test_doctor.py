@@ -147,20 +147,12 @@ def healthy(name):
     return state
 
 
-def found_as(kind, **other):
-    return healthy(kind.name).found._replace(**other)
-
-
-def servo_state(kind, setup=None, found=None, shares_id=False, **values):
-    """Return a healthy servo with some registers otherwise."""
+def servo_state(kind, number=None, shares_id=False, **values):
+    """Return a healthy servo with some registers otherwise, or of another model."""
     state = healthy(kind.name)
-    return structs.replace(
-        state,
-        setup=setup or state.setup,
-        found=found or state.found,
-        shares_id=shares_id,
-        values={**state.values, **values},
-    )
+    found = state.found._replace(number=number or state.found.number)
+    known = {**state.values, **values}
+    return structs.replace(state, found=found, shares_id=shares_id, values=known)
 
 
 @each
@@ -178,29 +170,53 @@ def test_a_joint_far_outside_its_range_is_an_error_with_the_text_of_a_refused_ru
 
 
 RULES = """
-both      | torque_enable 1            | warn  | torque is on | hold the joint
-both      | present_temperature 60     | warn  | 60 degC, it switches off above 70 | cool
-both      | present_position 1649      | warn  | is at step 1649, outside | gazerig calibrate
-both      | return_delay_time 250      | warn  | waits 500 us | --fix
-both      | min_position_limit 1700    | warn  | 1700..2446 cut the YAML's range 1650..2446 | --fix
-both      | max_position_limit 4095    | note  | 1650..4095 are wider than the YAML's range | --fix
-dynamixel | homing_offset -200         | warn  | Homing Offset -200 | Wizard
-dynamixel | velocity_limit 100         | note  | its Velocity Limit is 137 deg/s | max_speed_deg_s
-dynamixel | shutdown 1                 | warn  | does not switch off at each of overheating, \
-electrical shock, overload (Shutdown 1) | set Shutdown (63) to 53
-dynamixel | status_return_level 1      | warn  | does not confirm commands | --fix
-dynamixel | hardware_error_status 32   | error | latched: overload | switch its power off and on
-dynamixel | present_input_voltage 34   | error | 3.4 V, its limits are 3.5..7.0 V | supply
-dynamixel | present_input_voltage 44   | warn  | made for 5 V | thin wires
-dynamixel | baud_rate 1                | warn  | its Baud Rate is 57600 | gazerig setup
-feetech   | status 32                  | error | reports: overload | switch its
-feetech   | present_input_voltage 121  | error | 12.1 V, its limits are 4.0..8.0 V | sts3215-12v
-feetech   | angular_resolution 2       | warn  | counts 2 turns for one | --fix
-feetech   | position_offset -85        | note  | shifted by -85 steps | gazerig calibrate
-feetech   | max_torque 400             | note  | gives 40% of its torque | Max Torque (16)
-feetech   | overload_torque 100        | warn  | overload protection cannot act | Overload Torque (36)
+both | torque_enable 1 | warn | torque is on | hold the joint
+both | present_temperature 59 | ok | 59 degC |
+both | present_temperature 60 | warn | 60 degC, it switches off above 70 | cool
+both | present_temperature 69 | warn | 69 degC | cool
+both | present_temperature 70 | error | 70 degC, it switches off above 70 | cool
+both | present_position 1649 | warn | is at step 1649, outside | gazerig calibrate
+both | present_position 1650 | ok | at step 1650 |
+both | present_position 2446 | ok | at step 2446 |
+both | present_position 2447 | warn | is at step 2447, outside its range 1650..2446 | calibrate
+both | return_delay_time 250 | warn | waits 500 us | --fix
+both | min_position_limit 1700 | warn | 1700..2446 cut the YAML's range 1650..2446 | --fix
+both | max_position_limit 2445 | warn | 1650..2445 cut the YAML's range 1650..2446 | --fix
+both | max_position_limit 4095 | note | 1650..4095 are wider than the YAML's range | --fix
+both | min_position_limit 1649 | note | 1649..2446 are wider than the YAML's range | --fix
+both | min_position_limit 1651 max_position_limit 2447 | warn | 1651..2447 cut | --fix
+both | baud_rate 99 | ok | at step |
+dynamixel | min_position_limit 0 max_position_limit 0 | warn | 0..0 cut | --fix
+dynamixel | homing_offset -200 | warn | Homing Offset -200 | Wizard
+dynamixel | velocity_limit 100 | note | its Velocity Limit is 137 deg/s | max_speed_deg_s
+dynamixel | velocity_limit 382 | note | is 525 deg/s, the YAML asks for 526 | max_speed_deg_s
+dynamixel | velocity_limit 383 | ok | at step |
+dynamixel | shutdown 1 | warn | does not switch off at each of overheating, electrical shock, \
+overload (Shutdown 1) | set Shutdown (63) to 53
+dynamixel | status_return_level 1 | warn | does not confirm commands | --fix
+dynamixel | hardware_error_status 32 | error | latched: overload | switch its power off and on
+dynamixel | present_input_voltage 34 | error | 3.4 V, its limits are 3.5..7.0 V | supply
+dynamixel | present_input_voltage 35 | warn | 3.5 V, its limits are 3.5..7.0 V; made for 5 V | wires
+dynamixel | present_input_voltage 44 | warn | made for 5 V | thin wires
+dynamixel | present_input_voltage 45 | ok | 4.5 V |
+dynamixel | present_input_voltage 70 | ok | 7.0 V |
+dynamixel | present_input_voltage 71 | error | 7.1 V, its limits are | correct the supply
+dynamixel | baud_rate 1 | warn | its Baud Rate is 57600 | gazerig setup
+feetech | min_position_limit 0 max_position_limit 0 | warn | has no position limits of its own | --fix
+feetech | status 32 | error | reports: overload | switch its
+feetech | present_input_voltage 39 | error | 3.9 V, its limits are 4.0..8.0 V | correct the supply
+feetech | present_input_voltage 66 | warn | made for 7.4 V | thin wires
+feetech | present_input_voltage 67 | ok | 6.7 V |
+feetech | present_input_voltage 81 | error | 8.1 V, its limits are 4.0..8.0 V | correct the supply
+feetech | present_input_voltage 104 | error | 10.4 V, its limits are | correct the supply
+feetech | present_input_voltage 105 | error | 10.5 V, its limits are | sts3215-12v
+feetech | present_input_voltage 121 | error | 12.1 V, its limits are 4.0..8.0 V | sts3215-12v
+feetech | angular_resolution 2 | warn | counts 2 turns for one | --fix
+feetech | position_offset -85 | note | shifted by -85 steps | gazerig calibrate
+feetech | max_torque 400 | note | gives 40% of its torque | Max Torque (16)
+feetech | overload_torque 100 | warn | overload protection cannot act | Overload Torque (36)
 """
-"""Kind of servo, register and value, level, words of the finding and of its remedy."""
+"""Kind of servo, registers and values, worst level, words of the finding and of its remedy."""
 CASES = [
     (kind, *rule)
     for named, *rule in ([*map(str.strip, row.split("|"))] for row in RULES.strip().splitlines())
@@ -211,9 +227,11 @@ CASES = [
 
 @pytest.mark.parametrize(("kind", "value", "level", "words", "remedy"), CASES)
 def test_what_can_be_wrong(kind, value, level, words, remedy):
-    register, now = value.split()
-    state = servo_state(kind, **{register: int(now)})
-    found = one(apply_rules(state), level, PAN, words)
+    parts = value.split()
+    state = servo_state(kind, **dict(zip(parts[::2], map(int, parts[1::2]), strict=True)))
+    findings = apply_rules(state)
+    found = one(findings, level, PAN, words)
+    assert worst_level(findings) == level
     assert remedy in found.remedy
     assert bool(found.fixes) == ("--fix" in found.remedy)
     for fix in found.fixes:
@@ -222,8 +240,8 @@ def test_what_can_be_wrong(kind, value, level, words, remedy):
 
 @each
 def test_a_wrong_model_or_two_servos_are_not_judged_further(kind):
-    other = found_as(kind, number=1240 if kind is DYNAMIXEL else 1029)
-    (only,) = apply_rules(servo_state(kind, found=other, torque_enable=1))
+    other = 1240 if kind is DYNAMIXEL else 1029
+    (only,) = apply_rules(servo_state(kind, other, torque_enable=1))
     assert only.level == "error" and f"the YAML says {EYE[kind.name]}" in only.what
     assert "gazerig setup RIG --joint left_eye_pan" in only.remedy
     (only,) = apply_rules(servo_state(kind, shares_id=True, torque_enable=1))

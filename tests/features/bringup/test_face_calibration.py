@@ -98,7 +98,7 @@ def test_a_face_is_followed_and_its_part_is_the_target_until_it_is_lost():
 
 
 @pytest.mark.parametrize(("aside_m", "aimed"), [(0.017, True), (0.018, False)])
-def test_eyes_are_aimed_within_a_degree_of_the_part(aside_m: float, aimed: bool):
+def test_eyes_are_aimed_within_a_degree_of_the_part(aside_m, aimed):
     made = steering()
     target = chosen(made, 1.0, face(1, 1.0))
     pose = GazeState(

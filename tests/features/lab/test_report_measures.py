@@ -1,5 +1,6 @@
 """Rows of the report's measures, from traces whose every number is known by hand."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,7 @@ from gazerig.features.lab.analysis.event_detector import (
     find_events,
 )
 from gazerig.features.lab.report import eye_head, face, saccades, turns
-from gazerig.features.lab.report.gaze_trace import ROW, STATES, GazeTrace
+from gazerig.features.lab.report.gaze_trace import ROW, STATES, GazeTrace, JointBasis
 from gazerig.features.lab.report.statistics import MeasuredValue
 from gazerig.gaze.types import PARTS, Floats
 
@@ -54,6 +55,32 @@ def values(found: list[MeasuredValue]) -> dict[str, float]:
 def saccade(onset_s: float, deg: float, ms: float = 50.0, peak: float = 300.0) -> SaccadeEvent:
     asked = CommandedSaccade(onset_s, 0.04, deg, 200.0)
     return SaccadeEvent(onset_s, 1e-3 * ms, deg, peak, 0.5, asked)
+
+
+# --- Traces
+
+
+def test_a_trace_has_its_times_stretches_and_joints():
+    run = trace(4.0, saccades=(saccade(1.0, 9.0), saccade(3.0, 9.0)))
+    assert (run.seconds, run.rate_hz, run.mode) == (511 / 128, 128.0, "none")
+    run.rows["mode"][:300] = 2.0
+    assert run.mode == "listen"
+    # From .015 s before a saccade to .04 s after it
+    assert np.flatnonzero(~run.slow()).tolist() == [*range(127, 140), *range(383, 396)]
+    row = np.arange(512)
+    mask = (row < 10) | (row == 20) | (row >= 30) & (row < 60) | (row >= 500)
+    run.rows["shift"] = row >= 40  # another target ends a stretch of a least length
+    found = [*run.slices(mask), *run.slices(mask, 0.08)]
+    same(
+        np.array([(one.start, one.stop) for one in found]).T,
+        """
+        0 20 30 500 40 500; 10 21 60 512 60 512""",
+    )
+    linked = JointBasis(("eyes_pan", "left_upper_lid"), ("left_upper_lid",))
+    assert linked.has_measured_eye
+    assert not replace(linked, estimated=linked.names).has_measured_eye
+    assert (linked.basis("Lids"), linked.basis("Face")) == ("estimated", "measured")
+    assert linked.has_any(("eyes_pan", "jaw")) and not linked.has_any(("jaw",))
 
 
 # --- Saccades

@@ -52,9 +52,6 @@ def model_alone(role: Role) -> GazeTrace:
     return GazeTrace(table)
 
 
-pytestmark = pytest.mark.usefixtures("ideal_servos")
-
-
 @pytest.mark.parametrize("role", get_args(Role))
 def test_looks_away_have_the_share_rate_and_direction_of_people(role: Role):
     for one in measures(model_alone(role)):

@@ -1,6 +1,5 @@
 """Options of a world on the command line, and refusals in one line."""
 
-import importlib.util
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +30,6 @@ def test_what_does_not_fit_is_refused(changes: dict[str, object], why: str):
 
 
 def test_a_missing_package_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
     monkeypatch.setattr("gazerig.features.world.run.run_world.find_spec", lambda name: None)
     missing = re.escape(f"mujoco is not installed: {install_command('world')}")
     with pytest.raises(SetupError, match=missing):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
+from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import ImageArray
 from gazerig.drivers.vision.face.mtcnn import MtcnnDetector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
@@ -25,18 +26,12 @@ from gazerig.sim_mock.scenes.script import PersonScript, SceneScript
 @cache
 def why_not() -> str:
     """Return why nothing can render here, "" where something can."""
-    from gazerig.drivers.errors import SetupError
-
-    try:
-        from gazerig.features.world.gl_context import import_mujoco
-    except ModuleNotFoundError as error:
-        return str(error)
     try:
         mujoco = import_mujoco()
         from gazerig.features.world.renderer import Renderer
 
         Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 16, 16).close()
-    except SetupError as error:
+    except (ModuleNotFoundError, SetupError) as error:
         return str(error)
     return ""
 
