@@ -3,6 +3,8 @@
 import cv2
 import numpy as np
 import pytest
+from present import present
+from reviewed import assert_reviewed
 from seeing.row_09_identities import LENS, SIZE, Crowd, detected
 
 from gazerig.drivers.camera.capture_loop import FrameAnalyzer
@@ -59,6 +61,15 @@ def test_what_somebody_nearer_covers_does_not_count():
     assert apart(alone[0], partly) < 0.1
     hidden, _ = worn(picture((far, RED), (face(0.0, 1.4), GREEN)), far, face(0.05, 1.4))
     assert hidden is None
+
+
+def test_every_share_of_colours_is_as_it_was_reviewed():
+    faces = face(-0.3, 1.2), face(0.1, 2.4)
+    x, y = np.meshgrid(*map(np.arange, SIZE))
+    image = np.dstack((x % 256, y % 256, (x + y) % 256)).astype(np.uint8)
+    assert_reviewed(
+        "clothes", [(*of.colours, of.share) for of in map(present, worn(image, *faces))]
+    )
 
 
 def test_a_person_without_a_face_wears_the_same():

@@ -1,10 +1,12 @@
 """Faces are found now and then and placed in every frame: far ones too, and none is invented."""
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 import pytest
 from present import present
+from reviewed import assert_reviewed
 from seeing.material import (
     background,
     eyes_at,
@@ -15,7 +17,7 @@ from seeing.material import (
 )
 
 from gazerig.drivers.types import ImageArray, Pixels
-from gazerig.drivers.vision.face.auto import AutoDetector
+from gazerig.drivers.vision.face.auto import AutoDetector, far_tiles
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 
 WIDTH_PX, HEIGHT_PX, FIELD_DEG = 640, 400, 69.0
@@ -88,11 +90,16 @@ def test_a_face_in_a_dark_room_is_found_and_no_face_in_a_dark_empty_one():
         assert detector.find(noisy(dark, 2.0, np.random.default_rng(seed))) == ()
 
 
-def test_same_frames_same_numbers():
-    frames = [room(("astronaut", 2.0, 300.0 + 4 * i, 180.0), seed=i)[0] for i in range(4)]
-    runs = [[detector.find(f) for f in frames] for detector in (auto(), auto())]
-    for one, other in zip(*runs, strict=True):
-        assert [f.landmarks_px.tobytes() for f in one] == [f.landmarks_px.tobytes() for f in other]
+def test_every_number_of_faces_is_as_it_was_reviewed():
+    detector, rows = auto(), list[Sequence[float]]()
+    for step in range(6):
+        near = "astronaut", 1.2, 300.0 + 4.0 * step, 180.0
+        for face in detector.find(room(near, ("hopper", 5.0, 560.0, 120.0), seed=step)[0]):
+            signs = present(face.signs)
+            mouth = 1e3 * signs.mouth_opening_m, 1e3 * signs.mouth_sd_m
+            rows.append((step, *face.box_px, *face.landmarks_px.flat, face.confidence, *mouth))
+    sizes = (640, 400, 0.6), (1280, 720, 0.375), (320, 240, 1.0)
+    assert_reviewed("faces", [*rows, *(tile for size in sizes for tile in far_tiles(*size))])
 
 
 def test_an_open_mouth_is_measured_without_a_mesh():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from reviewed import assert_reviewed
 from seeing.material import noisy, portrait
 from seeing.row_05_finding_and_placing import after_frames
 
@@ -10,9 +11,12 @@ from gazerig.drivers.vision.face.detector import face_detector
 from gazerig.drivers.vision.face.params import FaceDetectorParams
 from gazerig.drivers.vision.face.preprocess import (
     FoundFace,
+    crop_square,
     grey_range,
     improve_contrast,
     new_faces,
+    to_squares,
+    whole_image,
 )
 
 PHOTO = portrait("astronaut").image[40:240, 100:340]
@@ -39,6 +43,14 @@ def test_a_wall_stays_a_wall():
     wall = noisy(np.full((120, 160, 3), 200, np.uint8), 2.0, np.random.default_rng(1))
     assert improve_contrast(wall).std() < 8.0 * wall.std()
     assert after_frames(face_detector(FaceDetectorParams()), wall) == 0
+
+
+def test_every_pixel_of_prepared_images_is_as_it_was_reviewed():
+    boxes = np.array([(-3.0, 5.5, 21.0, 29.5), (10.2, 3.1, 50.4, 43.3), (0.0, 0.0, 120.0, 120.0)])
+    crops = [crop_square(PHOTO, box, 8) for box in to_squares(boxes + (0.0, 0.0, 0.0, 4.0))]
+    tiles = whole_image(PHOTO, 12).cut(PHOTO)[1], improve_contrast(paled(0.4))[::40, ::40]
+    rows = [array.ravel().tolist() for crop in crops for array in crop]
+    assert_reviewed("prepared", [*rows, *(tile.ravel().tolist() for tile in tiles)])
 
 
 def test_a_pale_face_is_found():

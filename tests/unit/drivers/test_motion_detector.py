@@ -53,26 +53,6 @@ def last(pictures: list[Pictures], depth_m: NDArray[np.float64] | None = None) -
 FIVE: list[Any] = [scene(k) for k in range(5)]
 
 
-def test_a_square_is_where_it_is_and_as_large_as_it_is():
-    blob = last(FIVE)
-    assert blob.kind == "thing" and blob.box_px is not None and blob.centre_px is not None
-    left, top, width, height = blob.box_px
-    assert (left, top) == pytest.approx((40 + 12 - 0.5, 80 - 0.5), abs=6)
-    assert (width, height) == pytest.approx((64, 64), abs=12)
-    assert blob.area_px == pytest.approx(64 * 64, rel=0.25)
-    assert blob.centre_px == pytest.approx((52 + 31.5, 80 + 31.5), abs=6)
-    assert blob.flow_px_s == pytest.approx((90.0, 0.0), abs=3)
-    assert blob.radius_m == pytest.approx(2.0 * 36 / 233.6, rel=0.15)
-
-
-def test_without_depth_the_distance_is_assumed_and_says_so():
-    blob = last(FIVE)
-    assert not blob.depth_known
-    assert blob.p_camera_m[2] == 2.0 and blob.depth_sd_m == 1.0
-    assert blob.v_camera_m_s is not None
-    assert blob.v_camera_m_s[0] == pytest.approx(2.0 * 90 / 233.6, rel=0.05)
-
-
 def test_depth_is_the_median_of_what_is_known():
     rng = np.random.default_rng(0)
     depth = np.full((120, 160), 4.0)  # of half the size, too
@@ -137,10 +117,3 @@ def test_forgotten_is_forgotten_and_numbers_are_not_used_again():
         detector.forget()
         assert detector.before_s is None
     assert ids[0] != ids[1]
-
-
-def test_the_turn_between_two_orientations():
-    c, s = np.cos(0.1), np.sin(0.1)
-    before, now = np.eye(3), np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
-    ahead = np.transpose(now) @ before @ (0.0, 0.0, 1.0)
-    assert ahead == pytest.approx((-s, 0.0, c))  # who turns right sees the room go left
