@@ -39,6 +39,7 @@ def test_pixels_depth_and_lens_go_where_the_image_goes(orientation: FrameOrienta
     depth = rng.random((HEIGHT, WIDTH)).astype(np.float32)
     shot = orientation.turn_shot(Shot(1.0, 7, image, depth, LENS))
     assert (shot.captured_s, shot.number) == (1.0, 7)
+    assert FrameOrientation().turn_shot(shot) is shot
     assert shot.depth_m is not None and shot.lens is not None
     for x, y in ((0, 0), (639, 0), (0, 399), (200, 31)):
         (u, v), *_ = orientation.turn_points(np.array([[x, y]]), WIDTH, HEIGHT).round().astype(int)

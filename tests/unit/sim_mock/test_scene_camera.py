@@ -5,13 +5,16 @@ from typing import Any
 import numpy as np
 import pytest
 from fakes.scenes import EmptyScene
+from present import present
+from reviewed import assert_reviewed
 
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Vec3
 from gazerig.robot.model.frames import CameraMount, CameraParams
+from gazerig.robot.run.surroundings import load_scene
 from gazerig.sim_mock.cameras.detections import SceneCamera
 from gazerig.sim_mock.cameras.frame_times import FrameParams
-from gazerig.sim_mock.scenes.scene import ScenePerson, Thing
+from gazerig.sim_mock.scenes.scene import Scene, ScenePerson, Thing
 
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -29,7 +32,7 @@ class Still(EmptyScene):
         return self._things if t_s < 0.5 else self._later + self._things
 
 
-def camera(scene: Still, **params: Any) -> SceneCamera:
+def camera(scene: Scene, **params: Any) -> SceneCamera:
     still = CameraMount(CameraParams(position_mm=(0.0, 0.0, 0.0)))
     made = SceneCamera(FrameParams(**params), scene, still, where, np.random.default_rng(0))
     made.open()
@@ -47,14 +50,17 @@ def seen_at(made: SceneCamera, t_s: float) -> Detections:
     return found
 
 
-def test_things_and_hands_are_blobs_of_their_kind_at_their_place():
-    ball = Thing(7, "attack_target", (0.9, -0.1, 0.1), 0.05)
-    found = seen_at(camera(Still((ball,))), 0.2)
-    hand, target = found.blobs
-    assert hand.kind == "hand" and hand.p_camera_m == pytest.approx((-0.2, 0.0, 0.8), abs=0.02)
-    assert target.kind == "attack_target" and target.radius_m == 0.05
-    # Camera: x right, y down, z forward.
-    assert target.p_camera_m == pytest.approx((0.1, -0.1, 0.9), abs=0.02)
+@pytest.mark.parametrize("name", ["boxing", "three-people", "table"])
+def test_every_detection_is_as_it_was_reviewed(name: str):
+    rows, made = [], camera(load_scene(name))
+    for now_s in np.arange(0.0, 30.0, 0.7).tolist():
+        if found := made.latest(now_s):
+            for face in found.faces:
+                mouth = present(face.signs).mouth_opening_m
+                rows.append([now_s, *face.box_px, *face.landmarks_px.flat, 1e3 * mouth])
+            for blob in found.blobs:
+                rows.append([now_s, blob.id, *blob.p_camera_m, blob.radius_m, blob.spin_rad_s])
+    assert_reviewed(f"seen-{name}", rows)
 
 
 def test_a_thing_is_seen_late_and_only_inside_the_field():
