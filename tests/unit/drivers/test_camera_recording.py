@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from present import present
 
+from gazerig.drivers.camera import recording_format as fmt
 from gazerig.drivers.camera.capture_loop import CameraParts, CaptureLoop
 from gazerig.drivers.camera.params import CameraRecovery
 from gazerig.drivers.camera.pinhole import Intrinsics
@@ -98,6 +99,14 @@ def test_what_is_no_recording_is_named(tmp_path, make, words):
     make(path)
     with pytest.raises(CameraError, match=words):
         CameraReplay(path).open()
+
+
+def test_a_frame_needs_a_picture_and_nothing_else():
+    messages = dict(fmt.encode_shot(shot(0)._replace(depth_m=None, lens=None)))
+    found = fmt.decode_shot(messages)
+    assert (found.depth_m, found.lens, [*messages]) == (None, None, [fmt.PICTURE])
+    with pytest.raises(ValueError, match="no 16-bit depth image"):
+        fmt.decode_shot({fmt.DEPTH: messages[fmt.PICTURE], **messages})
 
 
 def test_replay_counts_on_and_repeats(file):

@@ -1,5 +1,7 @@
 """Colours of clothes below a face: their use, and their part of a picture."""
 
+from dataclasses import replace
+
 import cv2
 import numpy as np
 import pytest
@@ -67,6 +69,8 @@ def test_every_share_of_colours_is_as_it_was_reviewed():
     faces = face(-0.3, 1.2), face(0.1, 2.4)
     x, y = np.meshgrid(*map(np.arange, SIZE))
     image = np.dstack((x % 256, y % 256, (x + y) % 256)).astype(np.uint8)
+    unknown = replace(faces[0], landmarks_px=np.zeros((0, 2)))
+    assert worn(image, unknown) == [None]
     assert_reviewed(
         "clothes", [(*of.colours, of.share) for of in map(present, worn(image, *faces))]
     )

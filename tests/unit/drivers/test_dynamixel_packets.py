@@ -46,9 +46,6 @@ def test_what_looks_like_a_header_is_stuffed():
     assert instruction(1, 3, b"\x68\x00\xff\xff\xfd\x00") == vector(
         "FF FF FD 00 01 0A 00 03 68 00 FF FF FD FD 00 E2 7A"
     )
-    packet = GoalWrite(DYNAMIXEL, (1, 2)).packet((-1, 0x00FDFFFF), (0, 0))
-    assert b"\xff\xff\xfd\xfd" in packet
-    assert int.from_bytes(packet[5:7], "little") == len(packet) - 7
 
 
 def test_the_everyday_stuffed_status_is_understood():

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from gazerig.drivers.camera.pinhole import Intrinsics
 from gazerig.drivers.types import MovingBlob
 from gazerig.drivers.vision.motion.detector import MotionDetector
+from gazerig.drivers.vision.motion.flow import is_searchable
 from gazerig.drivers.vision.motion.params import MotionParams
 
 DT_S = 1 / 30
@@ -80,6 +81,14 @@ def test_pictures_too_small_or_narrow_are_silent(shape: tuple[int, int]):
     for k in range(3):
         assert look(detector, np.full(shape, 9 * k, dtype=np.uint8), k * DT_S) == ()
     assert detector.no_result_reason == "frame too small"
+
+
+def test_flow_needs_48_pixels_and_a_side_of_at_most_four_times_the_other():
+    """Below 8 pixels at the finest level OpenCV reads outside its memory."""
+    for shape in ((48, 48), (192, 48)):
+        assert is_searchable(np.zeros(shape, np.uint8))
+    for shape in ((47, 60), (48, 193)):
+        assert not is_searchable(np.zeros(shape, np.uint8))
 
 
 @pytest.mark.parametrize("level", [0, 255])

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from gazerig.drivers.camera.capture_loop import FrameAnalyzer
+from gazerig.drivers.camera.capture_loop import FrameAnalyzer, is_off_frame
 from gazerig.drivers.camera.orientation import FrameOrientation
 from gazerig.drivers.camera.pinhole import Intrinsics, intrinsics_of_view
 from gazerig.drivers.camera.source import Shot
@@ -70,6 +70,18 @@ def spot_at(direction: Floats, width: int, height: int, field_rad: float) -> Ima
     image = np.zeros((height, width, 3), np.uint8)
     image[v, u] = 255
     return image
+
+
+CENTRES = """-0.4 40 in, -0.6 40 out, 99.4 40 in, 99.6 40 out, 50 -0.4 in, 50 -0.6 out, 50 79.4 in,
+50 79.6 out, nan 0 in"""
+"""Pixels have their centres at whole numbers: a frame of 100 x 80 reaches from -0.5."""
+
+
+@pytest.mark.parametrize("centre", CENTRES.split(","))
+def test_a_face_whose_centre_is_outside_is_off_the_frame(centre: str):
+    *place, found = centre.split()
+    marks = np.array([(-5, -5), (5, -5), (0, 0), (-4, 5), (4, 5)]) + np.array(place, float)
+    assert is_off_frame(DetectedFace((0, 0, 1, 1), marks, 1.0), 100, 80) == (found == "out")
 
 
 @pytest.mark.parametrize("orientation", ALL, ids=NAMES)

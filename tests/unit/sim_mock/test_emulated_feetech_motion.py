@@ -1,7 +1,7 @@
 """Motion of emulated STS servos: closed forms of the profile, limits, origin, force."""
 
 import pytest
-from servo_bench import WRITE, FeetechBench
+from servo_bench import FeetechBench
 
 from gazerig.sim_mock.smart_servo.physics import Physics, ServoSpec
 
@@ -14,34 +14,9 @@ def one(physics=SMOOTH, start=2048.0):
     return FeetechBench(ServoSpec(1, "sts3215", start, physics=physics))
 
 
-def command(bench, goal, speed=0, acceleration=0, time_ms=0):
-    """Write acceleration, goal, time and speed at once, as drivers do."""
-    words = b"".join((w & 0xFFFF).to_bytes(2, "little") for w in (goal, time_ms, speed))
-    bench.ask(1, WRITE, 41, acceleration, words)
-
-
-# --- the path
-
-
 @pytest.fixture
 def bench():
     return one()
-
-
-@pytest.mark.parametrize("goal", [1000, 2049, 3500])
-def test_it_comes_to_its_goal_and_stays(goal):
-    bench = one(Physics())
-    bench.enable_torque()
-    command(bench, goal, speed=1500, acceleration=50)
-    assert bench.read(1, 66) == 1
-    path = []
-    for _ in range(300):
-        bench.wait(0.01)
-        path.append(bench.position())
-    assert abs(path[-1] - goal) <= STEADY_STEPS
-    assert len(set(path[-50:])) == 1
-    assert max(path) <= max(2048, goal) + 3 and min(path) >= min(2048, goal) - 3
-    assert (bench.read(1, 66), bench.read(1, 67, 2)) == (0, goal)
 
 
 # --- limits and origin
