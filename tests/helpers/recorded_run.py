@@ -45,7 +45,6 @@ class Recorded(NamedTuple):
     ticks: list[Tick]
     info: RunInfo
     said: str
-    goals_rad: tuple[float, ...]
 
 
 def record(
@@ -64,14 +63,13 @@ def record(
         seen.append(tick)
 
     made.robot.start(made.clock)
-    goals = made.robot._executor.commanded_rad
     stop = recorder.wrap_stop(lambda s: "seconds" if s >= seconds - 1e-9 else None)
     count = run(made.robot, made.clock, made.loop, stop, watch)
     made.robot.stop()
     said = recorder.close(count.stopped_by, made.bus.sent_bytes_digest())
     made.close()
     assert recorder.events() == () and recorder.lost == 0
-    return Recorded(path, seen, info, said, goals)
+    return Recorded(path, seen, info, said)
 
 
 def with_picture(tick: Tick, number: int) -> Tick:

@@ -13,8 +13,7 @@ from fakes.runs import go
 
 from gazerig.config.schema import load_rig
 from gazerig.gaze.angles import angle_between, norm, rotate_back, sub, yaw_pitch
-from gazerig.gaze.types import PART_NAMES, Floats
-from gazerig.robot.loop.head_state import head_state
+from gazerig.gaze.types import Floats
 from gazerig.robot.loop.power_down import Interrupts
 from gazerig.robot.loop.tick import Tick
 from gazerig.robot.model.commands import (
@@ -35,10 +34,6 @@ from gazerig.robot.model.commands import (
     Tune,
     check_command,
     read_request,
-)
-from gazerig.robot.model.reply import (
-    ControlSource,
-    control_sentence,
 )
 from gazerig.robot.run.session import prepare_shutdown
 
@@ -287,30 +282,8 @@ def test_a_direction_is_looked_in(running: Running, frame: Any):
     assert ticks[-1].client_control.arrived
 
 
-def test_a_person_is_followed_with_the_scanpath_on_the_face(running: Running):
-    percept = running.go()[-1].percept
-    assert percept is not None
-    person = percept.faces[0].id
-    reply, ticks = running.do(LookAtPerson(person, stay=True), 3.0)
-    assert not reply.refused and reply.control_number == 1
-    assert {(tick.target.kind, tick.target.id) for tick in ticks} == {("face", person)}
-    assert len({tick.target.part for tick in ticks}) > 1
-    assert (
-        ticks[-1].client_control.arrived
-        and ticks[-1].controlled_by == f"a client: look at person {person}"
-    )
-
-
-def test_nobody_is_followed_who_is_not_seen_and_no_longer_than_that(running: Running):
+def test_nobody_is_followed_who_is_not_seen(running: Running):
     assert running.do(LookAtPerson(99))[0].refused.startswith("no visible person '99'; available: ")
-    percept = running.go()[-1].percept
-    assert percept is not None
-    running.do(LookAtPerson(percept.faces[0].id, stay=True))
-    blind: Any = lambda found, poses: None  # noqa: E731
-    running.made.robot.perception.see = blind  # type: ignore[method-assign]
-    ticks = running.go(2.5)
-    assert ticks[100].controlled_by and not ticks[-1].controlled_by
-    assert ticks[-1].client_control.end_reason == f"person {percept.faces[0].id} is gone"
 
 
 def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running: Running):
@@ -337,50 +310,3 @@ def test_a_pixel_without_a_frame_is_refused(running: Running):
     running.made.robot.camera.latest = nothing  # type: ignore[method-assign]
     running.go()
     assert "no camera frame" in running.do(LookAtPixel((1.0, 1.0)))[0].refused
-
-
-# ---- The source of control of the head is one value with the same words everywhere.
-
-
-def test_who_controls_the_head_is_said_in_tick_and_state(running: Running):
-    tick = running.go(0.1)[-1]
-    assert tick.control_source == ControlSource() and not tick.control_source.overrides_gaze
-    state = head_state(tick)
-    assert state.headline.startswith("looks at person 1") and state.gaze.kind == "face"
-    assert state.gaze.part in PART_NAMES.values() and state.saliences[0].id == 1
-    running.do(Jog((("neck_yaw", 0.1), ("neck_pitch", 0.1)), who="ann"))
-    tick = running.do(Jog((("neck_yaw", 0.3),), who="ann"), 0.2)[1][-1]
-    leads = tick.control_source
-    assert (leads.kind, leads.who) == ("joint", "ann")
-    assert leads.joints == ("neck_yaw", "neck_pitch")
-    state = head_state(tick)
-    assert state.headline == "ann holds neck_yaw at 17.2 deg, neck_pitch at 5.7 deg"
-    assert (state.gaze.target, state.gaze.phase) == ("neck_yaw and neck_pitch held", "held")
-    assert state.gaze.reason == state.headline
-    assert (state.gaze.kind, state.gaze.part, state.saliences) == ("joint", None, ())
-    for pointer, kind, said in (
-        (False, "person", "ann makes it look at 1 0.2 0.3"),
-        (True, "pointer", "it looks at the pointer of ann"),
-    ):
-        tick = running.do(LookAt((1.0, 0.2, 0.3), who="ann", pointer=pointer), 0.2)[1][-1]
-        assert tick.control_source.kind == kind
-        assert head_state(tick).headline == said
-    state = head_state(running.do(Stop("STOP was pressed", who="ann"), 0.5)[1][-1])
-    assert state.control_source.kind == state.gaze.target == state.gaze.phase == "stopped"
-    assert state.headline == state.gaze.reason == "stopped: STOP was pressed; the torque is off"
-    running.go(2.0)
-    assert running.do(Resume(who="ann"), 0.1)[1][-1].control_source == ControlSource()
-
-
-def test_parking_is_shown_as_such_and_changes_nothing_of_it(running: Running):
-    running.order(Jog((("neck_yaw", 0.3),), who="ann", stay=True))
-    running.go(1.0)
-    made = running.made
-    ticks: list[Tick] = []
-    assert made.robot.park(made.park_rad, made.clock, made.loop, watch=ticks.append)
-    assert {tick.control_source.kind for tick in ticks} == {"parking"} and len(ticks) > 5
-    assert head_state(ticks[-1]).headline == control_sentence(ControlSource("parking"))
-    yaw = [
-        tick.joints.position_rad[ticks[0].guard_result.joints.index("neck_yaw")] for tick in ticks
-    ]
-    assert abs(yaw[-1]) < abs(yaw[0])

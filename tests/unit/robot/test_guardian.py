@@ -4,18 +4,16 @@ import os
 import signal
 import subprocess
 import sys
-import time
+from unittest.mock import Mock
 
 import pytest
 from feedback_rows import rows
 from loop_deaths import PATIENCE_S, driven
 from mixed_rig import mixed_rig
-from present import present
 from sts_rig import Rig as StsRig
 
 from gazerig.drivers.errors import ServoFault, SetupError
 from gazerig.drivers.feetech.memory_table import FeetechParams
-from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.process import child_process
 from gazerig.robot.guardian.guardian import HUNG_S, RETRY_S, GuardedBus, Guardian
 from gazerig.robot.guardian.heartbeat import (
@@ -25,7 +23,8 @@ from gazerig.robot.guardian.heartbeat import (
     HangDetector,
     Heartbeat,
 )
-from gazerig.robot.guardian.release_plan import ReleasePlan, describe
+from gazerig.robot.guardian.release_plan import ReleasePlan
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.robot.run.buses import bus_ports, release_plans
 
 PLAN = ReleasePlan("feetech", "/tmp/no such port", (1, 2), FeetechParams(), "feetech")
@@ -64,12 +63,6 @@ def test_all_ports_are_guarded(tmp_path):
     assert kinds == {"": "maestro", "neck": "dynamixel", "tilt": "feetech"}
     assert plans["tilt"].ids == (1,)
     assert plans["tilt"].params.baud == rig.bus_named("tilt").section.baud
-
-
-def test_plans_are_described():
-    assert describe(PLAN) == "torque off on 2 servos of /tmp/no such port"
-    board = ReleasePlan("maestro", "/dev/a 'b\"", (0, 5), MaestroParams(True, 24))
-    assert describe(board) == "pulses off on 2 channels of /dev/a 'b\""
 
 
 def test_the_guardian_is_light():
@@ -137,13 +130,13 @@ def sts():
 def test_it_watches_from_before_torque_on_until_torque_off(sts):
     other = sts.guardian.other
     assert not other.is_armed(0)
-    refused, sts.inner.enable_torque = sts.inner.enable_torque, _refuse
+    enabled, sts.inner.enable_torque = sts.inner.enable_torque, refusing()
     with pytest.raises(ServoFault):
         sts.bus.enable_torque()
     assert other.is_armed(0), "some servos may have had their torque already"
-    sts.inner.enable_torque = refused
-    sts.bus.enable_torque()
-    assert other.is_armed(0)
+    assert other.beats == 1
+    sts.inner.enable_torque = enabled
+    assert len(sts.bus.enable_torque()) == 4
     sts.bus.disable_torque()
     assert not other.is_armed(0)
 
@@ -153,6 +146,17 @@ def test_every_tick_is_a_sign_of_life(sts):
     before = sts.guardian.other.beats
     sts.run(0.1, [2000] * 4)
     assert sts.guardian.other.beats == before + 20  # a read and a write each
+
+
+def test_traffic_of_one_call_counts_for_ten_seconds(monkeypatch):
+    clock = SimulatedClock()
+    monkeypatch.setattr("gazerig.robot.guardian.guardian.RealClock", lambda: clock)
+    guardian = Unattended()
+    guardian.beat()
+    for now_s, beats in ((9.9, 2), (10.0, 2)):
+        clock.sleep_until(now_s)
+        guardian.beat_on_traffic()
+        assert guardian.other.beats == beats
 
 
 def test_a_loop_that_wakes_takes_hold_where_the_joints_are(sts):
@@ -172,13 +176,14 @@ def test_a_loop_that_wakes_takes_hold_where_the_joints_are(sts):
     assert all(r is not None and r.rearmed for r in readings)
     assert not any(r.rearmed for r in sts.tick(None))
     assert any("did not run" in line for line in sts.bus.events())
-    sts.run(0.5, [2250] * 4)
+    moved = sts.run(0.5, [2250] * 4)[-1]
+    assert moved is not None and moved.position_steps == pytest.approx(2250.0, abs=15.0)
     assert all(sts.get(i, 40) == 1 for i in (1, 2, 3))
 
 
 def test_servos_that_refuse_are_asked_again_and_get_no_goals(sts):
     sts.bus.enable_torque()
-    enabled, sts.inner.enable_torque = sts.inner.enable_torque, _refuse
+    enabled, sts.inner.enable_torque = sts.inner.enable_torque, refusing()
     sts.guardian.other.set_state(0, RELEASED)
     readings = sts.run(2.5 * RETRY_S, [2300] * 4)
     assert not any(r.torque for r in readings if r is not None)
@@ -186,6 +191,7 @@ def test_servos_that_refuse_are_asked_again_and_get_no_goals(sts):
     assert [line for line in lines if "too hot" in line] == [
         "torque could not be switched on again: servo 1: too hot"
     ], lines
+    assert sts.inner.enable_torque.call_count == 3
     sts.inner.enable_torque = enabled
     sts.run(RETRY_S + 0.05, [2300] * 4)
     assert any("torque on again" in line for line in sts.bus.events())
@@ -220,21 +226,11 @@ def test_servos_that_nobody_held_stay_limp(sts):
     assert not sts.bus.events() and not any(sts.get(i, 40) for i in (1, 2, 3))
 
 
-def _refuse():
-    raise ServoFault("servo 1: too hot")
+def refusing():
+    return Mock(side_effect=ServoFault("servo 1: too hot"))
 
 
 # --- the process, without any port
-
-
-@pytest.fixture
-def guarding():
-    guardian = Guardian((PLAN,))
-    guardian.join(0)
-    guardian.arm(0)
-    yield guardian
-    guardian.disarm(0)
-    guardian.leave(0)
 
 
 def test_it_ends_silently_when_all_is_off(capfd):
@@ -258,46 +254,44 @@ def test_without_a_guardian_there_is_no_torque(monkeypatch):
     guardian.leave(0)
 
 
-def test_one_that_dies_is_started_again_and_said(guarding):
-    first = guarding.pid
-    os.kill(present(first), signal.SIGKILL)
-    now_s, end_s = 0.0, time.monotonic() + PATIENCE_S
-    while guarding.pid == first and time.monotonic() < end_s:
-        time.sleep(0.01)
-        now_s += 1.0
-        guarding.check(now_s)
-    assert guarding.pid != first
-    assert [line for line in guarding.events() if "exit code -9" in line]
+def test_one_that_ends_or_hangs_is_replaced_and_said(monkeypatch):
+    started, suspended, guardian = list[Mock](), set[int](), Guardian((PLAN, PLAN))
 
+    def start(module, fd, plans, pass_fds, **options):
+        if len(started) == 5:
+            raise OSError(11, "no process")
+        started.append(Mock(pid=len(started), heartbeat=Heartbeat(*pass_fds)))
+        return started[-1]
 
-def suspend(guardian):
-    """Suspend a guardian that is at work; return its process id."""
-    pid, checks = present(guardian.pid), guardian._heartbeat.checks
-    end_s = time.monotonic() + PATIENCE_S
-    while guardian._heartbeat.checks == checks and time.monotonic() < end_s:
-        time.sleep(0.01)
-    os.kill(pid, signal.SIGSTOP)
-    while not child_process.is_suspended(pid) and time.monotonic() < end_s:
-        time.sleep(0.01)
-    return pid
+    monkeypatch.setattr(child_process, "start", start)
+    monkeypatch.setattr(child_process, "is_suspended", lambda pid: pid in suspended)
+    guardian.check(50.0)  # of none that runs
+    guardian.join(0)
 
+    def check(now_s, code=None, why="", looks=0):
+        for _ in range(looks):
+            started[-1].heartbeat.count_check()
+        started[-1].poll.return_value, before = code, len(started)
+        guardian.check(now_s)
+        assert guardian.events() == ((f"the guardian {why}: started again",) if why else ())
+        assert len(started) == before + bool(why)
 
-def test_one_that_is_suspended_is_replaced_at_the_next_check(guarding):
-    first = suspend(guarding)
-    guarding.check(100.0)
-    assert guarding.pid != first and not os.path.exists(f"/proc/{first}")
-    assert guarding.events() == ("the guardian did not respond: started again",)
-    guarding.wait_until_ready()
-
-
-def test_one_that_looks_at_nothing_is_replaced(guarding, monkeypatch):
-    guarding.check(0.0)
-    first = suspend(guarding)
-    monkeypatch.setattr(child_process, "is_suspended", lambda pid: False)
-    guarding.check(100.0)
-    guarding.check(100.0 + 0.9 * HUNG_S)
-    assert guarding.pid == first
-    guarding.check(100.1 + HUNG_S)
-    assert guarding.pid != first
-    guarding.check(200.0)  # the new one may still be starting
-    assert len(guarding.events()) == 1
+    check(100.0)
+    started[0].heartbeat.set_state(1, RELEASING)
+    check(100.2, -9)  # four times a second
+    check(100.25, -9, "ended unexpectedly (exit code -9)")
+    assert [guardian.state(k) for k in (0, 1)] == [IDLE, RELEASED]
+    check(105.2, 1)  # not more often than every five seconds
+    check(105.5, 1, "ended unexpectedly (exit code 1)")
+    check(200.0)  # it is still starting
+    check(201.0, looks=3)
+    check(201.0 + HUNG_S)
+    check(203.5, None, "did not respond")
+    assert [process.kill.called for process in started] == [False, False, True, False]
+    assert all(process.stdin.close.called for process in started[:3])
+    suspended.add(3)
+    check(208.25)
+    check(208.5, None, "did not respond")
+    started[4].poll.return_value = 0
+    guardian.check(220.0)
+    assert guardian.events()[1] == "no guardian: no process; tried again in 5 s"

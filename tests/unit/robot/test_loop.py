@@ -73,7 +73,10 @@ def test_a_servo_fault_ends_the_loop_with_its_cause():
 def test_parking_reaches_the_pose_and_torque_goes_off(monkeypatch: pytest.MonkeyPatch):
     assembly = simulated(rate=100.0)
     ticks(assembly, 4.0)
-    assert assembly.robot.park(assembly.park_rad, assembly.clock, assembly.loop)
+    seen: list[Tick] = []
+    made = assembly
+    assert made.robot.park(made.park_rad, made.clock, made.loop, watch=seen.append)
+    assert {tick.control_source.kind for tick in seen} == {"parking"} and len(seen) > 5
     bus: Any = assembly.robot.body.bus
     chain = bus._port.chain
     parked = assembly.robot.body.angles(list(chain.positions_steps()))

@@ -22,10 +22,10 @@ from branch import Branch
 from fakes.runs import simulated
 
 from gazerig.drivers.errors import SetupError
-from gazerig.robot.loop import body, client_control
+from gazerig.robot.loop import body
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.loop import Robot, Tick
-from gazerig.robot.model.commands import Get, LookAt, ReadMenus, Request, Resume, Stop, Value
+from gazerig.robot.model.commands import Get, ReadMenus, Request, Resume, Stop, Value
 from gazerig.robot.net import client
 from gazerig.robot.net import socket_io as remote_socket
 from gazerig.robot.net import socket_server as server_module
@@ -325,22 +325,6 @@ def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
 
 
 # Leads of programs, and floods
-
-
-def test_a_program_leads_while_it_lives_and_is_named(
-    rig: RobotClient, beat: Beat, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setattr(client_control, "HEARTBEAT_S", 1.0)  # simulated: time goes faster here
-    monkeypatch.setattr(client, "_EVERY_S", 0.05)
-    with RobotClient.connect(who="a show") as show:
-        assert show.send(LookAt((-1.0, 0.0, 0.3))).control_number and show.in_control
-        status = rig.status()
-        assert status["controlled_by"] == f"a show (process {os.getpid()}): look at -1 0 0.3"
-        count = len(beat.ticks)
-        assert beat.pulse.wait_for_ticks(400, 20.0)  # twice as long
-        assert show.in_control and beat.ticks[-1].controlled_by and len(beat.ticks) > count
-    assert beat.pulse.wait_for_ticks(250, 20.0)
-    assert beat.ticks[-1].controlled_by == "" and rig.status()["controlled_by"] == ""
 
 
 def test_nobody_passes_himself_off_as_another(rig: RobotClient, folder: Path):

@@ -23,15 +23,16 @@ from child_processes import command
 from desk import GAZE_JOINTS
 from fakes.runs import simulated, ticks
 from jsonschema import Draft202012Validator
+from made_ticks import made_tick
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from msgspec.structs import replace
 from recorded_run import STARTED, Recorded, exact, info_for
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Detections
 from gazerig.gaze.types import Bodies, Face, Percept
-from gazerig.robot.loop.tick import MeasuredJoints, TorqueEnabled
+from gazerig.robot.loop.tick import Tick, TickRecord
+from gazerig.robot.loop.tick_stream import encode
 from gazerig.robot.model.clock import RealClock, SimulatedClock
 from gazerig.robot.model.reply import ControlState, TrackState
 from gazerig.robot.recording import run_format as fmt
@@ -51,19 +52,6 @@ def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
         for number, at_s in enumerate(times_s, 1)
         if picker.is_due(Detections(at_s, number, 2, 2, image=picture))
     ]
-
-
-def test_what_entered_the_run_beside_the_ticks_is_kept(recorded: Recorded):
-    kept = list(RunRecording(recorded.path).moments())
-    engaged, measured = kept[0].before
-    assert engaged == TorqueEnabled(recorded.goals_rad)
-    assert isinstance(measured, MeasuredJoints) and measured.t_s == 0.0
-    assert measured.joints.position_rad[6] == pytest.approx(-0.21, abs=0.01)
-    times = [0.0, *(tick.t_s for tick in recorded.ticks)]
-    assert [m.dt_s for m in kept] == [b - a for a, b in zip(times, times[1:], strict=False)]
-    # The resumption has new goals.
-    more = {n: [type(one).__name__ for one in m.before] for n, m in enumerate(kept) if m.before}
-    assert more == {0: ["TorqueEnabled", "MeasuredJoints"], 141: ["TorqueEnabled"]}
 
 
 def test_other_programs_open_it(recorded: Recorded):
@@ -103,7 +91,15 @@ def test_other_programs_open_it(recorded: Recorded):
     assert tuple(states) == GAZE_JOINTS
 
 
-def test_any_tick_comes_back(recorded: Recorded, tmp_path: Path):
+def write_ticks(path: Path, ticks: Iterable[Tick]) -> Path:
+    made = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), info_for())
+    for tick in ticks:
+        made.write_ticks(encode([TickRecord(tick, 0.1, tick.percept)]))
+    assert made.close(RunEnd("seconds")).failed == ""
+    return path
+
+
+def test_any_tick_comes_back(tmp_path: Path):
     ticks = []
     for odd in (0.25, nan, -inf):
         track = TrackState("nod", "", 0.5, 1.0, owns=("jaw",), who="somebody", number=2)
@@ -112,21 +108,11 @@ def test_any_tick_comes_back(recorded: Recorded, tmp_path: Path):
         bodies = Bodies((3, 9), ("face", "hand"), *(np.full((2, 3), odd),) * 3,
                         np.array([odd, 1.0]), np.full((2, 6, 6), odd))  # fmt: skip
         ticks += [
-            replace(
-                recorded.ticks[-1],
-                client_control=lead,
-                tracks=(track,),
-                percept=percept,
-                detections=None,
-            )
+            made_tick(client_control=lead, tracks=(track,), percept=percept)
             for percept in (Percept(odd, bodies, (face,)), Percept(1.0, scene=4), None)
         ]
-    recorder = Recorder(tmp_path / "odd.mcap", recorded.info, patient=True)
-    recorder.open()
-    for tick in ticks:
-        recorder.record(tick)
-    recorder.close()
-    assert list(map(repr, RunRecording(tmp_path / "odd.mcap").ticks())) == list(map(repr, ticks))
+    found = RunRecording(write_ticks(tmp_path / "odd.mcap", ticks)).ticks()
+    assert list(map(repr, found)) == list(map(repr, ticks))
 
 
 @pytest.mark.parametrize(
@@ -174,18 +160,14 @@ def test_a_recording_cut_anywhere_opens_and_keeps_what_is_whole(recorded: Record
     assert counts == sorted(counts, reverse=True) and counts[-1] < 299
 
 
-def test_time_that_runs_back_or_leaps_is_no_run(recorded: Recorded, tmp_path: Path):
-    with recorded.path.open("rb") as file:
-        found = [json.loads(m.data) for *_, m in make_reader(file).iter_messages([fmt.TICK])][:3]
-    for number, (moved_s, right) in enumerate(((0.0, True), (-0.006, False), (4000.0, False))):
-        path = tmp_path / f"{number}.mcap"
-        writer = RunWriter(os.open(path, os.O_WRONLY | os.O_CREAT), recorded.info)
-        for nth, tick in enumerate(found):
-            t_s = tick["tick"]["t_s"] + moved_s * (nth == 2)
-            writer.add(fmt.TICK, 0.0, {**tick, "tick": {**tick["tick"], "t_s": t_s}})
-        writer.close(RunEnd("seconds"))
+def test_time_that_runs_back_or_leaps_is_no_run(tmp_path: Path):
+    for number, (t_s, right) in enumerate(
+        ((5.0, True), (3604.9, True), (4.99, False), (3605.0, False))
+    ):
+        path = write_ticks(tmp_path / f"{number}.mcap", map(made_tick, (0.0, 5.0, t_s)))
         if right:
-            assert len(list(RunRecording(path).ticks())) == 3
+            assert [tick.t_s for tick in RunRecording(path).ticks()] == [0.0, 5.0, t_s]
+            assert RunRecording(path).duration_s == pytest.approx(t_s)
             continue
         with pytest.raises(BadRecording, match="damaged .a tick at"):
             list(RunRecording(path).ticks())

@@ -56,7 +56,6 @@ class Stops:
     ("stoppers", "who", "confirmed", "t_s", "refused"),
     [
         (["ann"], "ann", False, 11.75, "a stop lasts at least 2 s: try again in 0.2 s"),
-        (["ann"], "ann", True, 11.0, "a stop lasts at least 2 s: try again in 1.0 s"),
         (["ann"], "ann", False, 12.0, ""),
         (["ann"], "bob", True, 12.0, ""),
         (["ann"], "bob", False, 12.0, f"stopped by ann{CONFIRM}"),
