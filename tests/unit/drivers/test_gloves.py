@@ -1,10 +1,12 @@
 """Boxing gloves found by their colour."""
 
+from dataclasses import astuple
 from math import radians
 
 import cv2
 import numpy as np
 import pytest
+from reviewed import assert_reviewed
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.pinhole import intrinsics_of_view
@@ -67,6 +69,17 @@ def test_a_glove_of_which_a_part_is_hidden_is_as_far_away_as_it_was():
         assert len(far) == 1 and far[0] == pytest.approx(0.8, rel=0.1)
     unknown = found(GloveDetector(), scene((0.17, 0.1, 0.8), other))
     assert all(one.p_camera_m[2] < 0.5 for one in unknown)
+
+
+def test_every_number_of_gloves_is_as_it_was_reviewed():
+    """One goes behind another, one out of the picture, and one has a highlight."""
+    finder, rows = GloveDetector(), []
+    for k in range(7):
+        image = scene((0.02 + 0.0375 * k, 0.1, 0.8), (0.15, 0.1, 0.4), (-0.3 - 0.06 * k, -0.1, 0.6))
+        cv2.circle(image, (400, 330), 12, (225, 220, 240), -1)
+        for one in found(finder, image, k / 30):
+            rows.append(np.hstack([x for x in astuple(one) if x not in (None, "hand")]).tolist())
+    assert_reviewed("gloves", rows)
 
 
 def test_the_arm_and_trunk_behind_a_glove_are_nothing_of_their_own():

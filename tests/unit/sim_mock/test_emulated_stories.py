@@ -158,6 +158,12 @@ wait 0.5
 torque_enable 0
 do reset 1
 wait 1""",
+    "scs15": """do turn 1 250
+wait 0.1
+goal_position 500
+torque_enable 1
+wait 0.1
+wait 1""",
     "scs0009": """max_torque 500
 goal_speed 300
 torque_enable 1

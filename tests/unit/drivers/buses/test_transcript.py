@@ -21,13 +21,15 @@ SMART = """0.5 2
 0.35 3 hold
 0.45 6
 0.45 20 lose {b} count 3
-0.45 4 lose all count 2
+0.45 6 lose all for 0.07
 0.45 20 corrupt {b} 41 count 2
 0.45 4 truncate {c} 7 count 2
 0.45 8 delay {b} 9 count 3
 0.45 3 echo
 0.45 50 brown-out {a}
-0.6 8 pause 0.5
+0.6 4 pause 0.5
+0.6 0 lose {b} for 0.6
+0.6 12 pause 0.5
 0.6 25 overload {c}
 0.6 5 temperature {a} 90
 0.6 60 temperature {a} 40
