@@ -118,7 +118,7 @@ def offset_direction(way: Vec3, start: Vec3, further_rad: float, aside_rad: floa
     """Return a direction moved further along its great circle and across it.
 
     way: unit vector to move; start: unit vector at the start of the great circle
-    further_rad: angle beyond ``way``; aside_rad: angle to the left of the path as seen from outside
+    further_rad: angle beyond ``way``; aside_rad: angle to the left of the path from its centre
     """
     pole = cross(start, way)
     if norm(pole) < 1e-12:

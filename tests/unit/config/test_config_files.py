@@ -1,7 +1,5 @@
 """YAML files as they come: unreadable, shipped by name, or any text at all."""
 
-from pathlib import Path
-
 import pytest
 from fakes.small_config import Rig, faults_of, one_id_each, write
 from hypothesis import HealthCheck, example, given, settings
@@ -70,13 +68,13 @@ camera:
         ),
     ],
 )
-def test_a_file_that_cannot_be_used(tmp_path: Path, text: str | bytes, fault: str):
+def test_a_file_that_cannot_be_used(tmp_path, text, fault):
     assert faults_of(tmp_path, text) == [fault]
     with pytest.raises(ConfigError):
         read_yaml(tmp_path / "rig.yaml")
 
 
-def test_an_absent_file_is_named_with_a_near_one(tmp_path: Path):
+def test_an_absent_file_is_named_with_a_near_one(tmp_path):
     write(tmp_path, GOOD, "nod.yaml")
     with pytest.raises(ConfigError) as caught:
         load(tmp_path / "nodd.yaml", Rig)
@@ -86,9 +84,7 @@ def test_an_absent_file_is_named_with_a_near_one(tmp_path: Path):
     )
 
 
-def test_an_unknown_shipped_name_lists_those_that_exist(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_an_unknown_shipped_name_lists_those_that_exist(tmp_path, monkeypatch):
     (tmp_path / "rigs").mkdir()
     for name in ("shake.yaml", "nod.yaml", "notes.txt"):
         write(tmp_path / "rigs", GOOD, name)
@@ -122,7 +118,7 @@ _pieces = st.sampled_from(
 @example(text="joints: {a: {id: 0x" + "f" * 5000 + "}}")
 @example(text="baud: " + "9" * 5000)
 @example(text="gains: {x: " + "9" * 39 + "}")
-def test_junk_text_gives_a_config_error_and_nothing_else(tmp_path: Path, text: str):
+def test_junk_text_gives_a_config_error_and_nothing_else(tmp_path, text):
     file = write(tmp_path, text.encode("utf-8", "surrogatepass"))
     try:
         assert isinstance(load(file, Rig, checks=[one_id_each]), Rig)

@@ -1,8 +1,5 @@
 """A rig has few keys: each is set by a shipped file, has a paper or an effect that people see."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 import yaml
 
@@ -16,7 +13,7 @@ MOST_KEYS = 160
 MOST_LINES = 300
 
 
-def leaves(declared: Declaration, key: str) -> Iterator[str]:
+def leaves(declared, key):
     """Yield every key that holds a value; a star stands for a name that the user chooses."""
     inner = declared.inner
     if declared.params is not None:
@@ -34,7 +31,7 @@ def test_a_rig_has_at_most_so_many_keys():
     assert len(keys) <= MOST_KEYS
 
 
-def test_a_removed_key_is_answered_with_what_to_do(tmp_path: Path):
+def test_a_removed_key_is_answered_with_what_to_do(tmp_path):
     keys = set(leaves(Declaration("params", params=Rig), ""))
     removed = yaml.safe_load((SHIPPED / "removed_keys.yaml").read_text())
     assert keys.isdisjoint(removed) and all(isinstance(text, str) for text in removed.values())

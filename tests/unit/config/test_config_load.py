@@ -1,6 +1,5 @@
 """YAML to frozen values: every fault with its file and line, layer over layer."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -13,12 +12,12 @@ from gazerig.config.validation import validate
 from gazerig.params import Bounds
 
 
-def has_neck(rig: Rig) -> Iterator[tuple[str, str]]:
+def has_neck(rig):
     if "neck" not in rig.joints:
         yield "joints", "there is no neck"
 
 
-def camera_keeps_up(rig: Rig) -> Iterator[tuple[str, str]]:
+def camera_keeps_up(rig):
     if rig.camera.fps < 10:
         yield "camera.fps", "too slow to follow a face"
 
@@ -38,7 +37,7 @@ camera:
 """
 
 
-def test_a_right_file_becomes_the_frozen_value(tmp_path: Path):
+def test_a_right_file_becomes_the_frozen_value(tmp_path):
     rig = load(write(tmp_path, GOOD), Rig, checks=CHECKS)
     assert rig == Rig(
         name="nod",
@@ -61,7 +60,7 @@ tags: [a, b]
 """
 
 
-def test_values_at_their_bounds_whole_numbers_and_empty_sections_are_right(tmp_path: Path):
+def test_values_at_their_bounds_whole_numbers_and_empty_sections_are_right(tmp_path):
     assert load(write(tmp_path, CORNERS), Rig) == Rig(
         name="nod",
         joints={"low": Joint(0), "high": Joint(252, 1.0)},
@@ -92,12 +91,12 @@ def test_a_default_outside_its_own_bounds_is_found():
         ("baud: +5", 5),
     ],
 )
-def test_whole_numbers_are_those_of_yaml_1_2(tmp_path: Path, line: str, value: int):
+def test_whole_numbers_are_those_of_yaml_1_2(tmp_path, line, value):
     assert load(write(tmp_path, GOOD + line + "\n"), Rig).baud == value
 
 
 @pytest.mark.parametrize("word", ["no", "on", "yes", "2026-01-31", "1:30", "=", "0.1.2", "'5'"])
-def test_words_that_look_like_something_else_are_text(tmp_path: Path, word: str):
+def test_words_that_look_like_something_else_are_text(tmp_path, word):
     file = write(tmp_path, GOOD.replace("nod", word))
     assert load(file, Rig).name == word.strip("'")
 
@@ -147,7 +146,7 @@ def test_words_that_look_like_something_else_are_text(tmp_path: Path, word: str)
         ("nod", "“nod”", "2: name: column 7 is a typographic quote (“); write '\"'"),
     ],
 )
-def test_each_fault_alone(tmp_path: Path, change: str, to: str, fault: str):
+def test_each_fault_alone(tmp_path, change, to, fault):
     assert GOOD.count(change) == 1
     found = faults_of(tmp_path, GOOD.replace(change, to), CHECKS)
     assert found == [f"rig.yaml:{line}" for line in fault.splitlines()]
@@ -216,14 +215,14 @@ rig.yaml:28: pair.1: is 10, wanted a whole number, -9 to 9
 rig.yaml:29: tags: is {}, wanted a list, each text"""
 
 
-def test_all_faults_together_in_one_message(tmp_path: Path):
+def test_all_faults_together_in_one_message(tmp_path):
     assert faults_of(tmp_path, ALL_WRONG, CHECKS) == ALL_FAULTS.splitlines()
 
 
 # ---- layers -----------------------------------------------------------------------------
 
 
-def test_later_layers_win_key_by_key(tmp_path: Path):
+def test_later_layers_win_key_by_key(tmp_path):
     base = write(tmp_path, GOOD + "spare: {fps: 10}\nmatrix: [[1], [2]]\n", "base.yaml")
     middle = write(tmp_path, "joints: {pan: {low_deg: -5}, tilt: {id: 3}}\n", "middle.yaml")
     top = write(tmp_path, "joints: {pan: {id: 9}}\nspare:\nmatrix: [[3]]\n", "top.yaml")
@@ -237,7 +236,7 @@ def test_later_layers_win_key_by_key(tmp_path: Path):
     assert rig.camera.offset_m == (0.0, 0.5, -0.01)
 
 
-def test_a_fault_names_the_layer_its_value_comes_from(tmp_path: Path):
+def test_a_fault_names_the_layer_its_value_comes_from(tmp_path):
     base = write(tmp_path, GOOD.replace("500", "9000").replace("nod", "5"), "base.yaml")
     top = write(
         tmp_path, "\n\njoints:\n  pan:\n    id: 1\n  tilt: {}\nname: ok\nfps: 3\n", "top.yaml"

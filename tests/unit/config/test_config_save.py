@@ -68,11 +68,11 @@ def small(tmp_path):
     return file
 
 
-def put(path: Path, changes: dict[str, Any], load_again=check):
+def put(path, changes, load_again=check):
     return save(path, changes, NOW, load_again)
 
 
-def lines_that_differ(old: str, new: str) -> list[tuple[str, str]]:
+def lines_that_differ(old, new):
     pairs = zip(old.splitlines(), new.splitlines(), strict=True)
     return [pair for pair in pairs if pair[0] != pair[1]]
 

@@ -15,7 +15,7 @@ from gazerig.robot.run.requests import RequestHandler
 
 
 @pytest.fixture
-def home(tmp_path: Path) -> Path:
+def home(tmp_path):
     (tmp_path / "rig").mkdir()
     (tmp_path / "rig2").mkdir()
     (tmp_path / "secret.yaml").write_text("a: 1\n")
@@ -24,7 +24,7 @@ def home(tmp_path: Path) -> Path:
     return tmp_path / "rig"
 
 
-def test_files_beside_the_rig_and_shipped_names(home: Path):
+def test_files_beside_the_rig_and_shipped_names(home):
     confined = AllowedFolder(home)
     for given in ("mine.yaml", "below/mine.yaml", f"{home}/mine.yaml", "./x/../mine.yaml"):
         path = Path(confined.check_file(given))
@@ -44,7 +44,7 @@ def test_files_beside_the_rig_and_shipped_names(home: Path):
         "//etc/passwd",
     ],
 )  # fmt: skip
-def test_files_elsewhere_are_refused(home: Path, given: str):
+def test_files_elsewhere_are_refused(home, given):
     with pytest.raises(ConfigError, match="only files in|nothing named"):
         AllowedFolder(home).check_file(given, "characters" if given else "")
     if given not in ("", ".", ".."):
@@ -61,15 +61,13 @@ def test_files_elsewhere_are_refused(home: Path, given: str):
         {"buses.eyes.port": "/dev/ttyS0"}, {"sound.voice": "rm -r"}, {"sound": {"voice": ["rm"]}},
     ],
 )  # fmt: skip
-def test_what_starts_programs_or_opens_devices_is_not_set_from_the_network(
-    home: Path, changes: dict[str, object]
-):
+def test_what_starts_programs_or_opens_devices_is_not_set_from_the_network(home, changes):
     with pytest.raises(ConfigError, match="cannot be set over the network") as caught:
         AllowedFolder(home).check_changes({**changes, "gaze.lids.close_ms": 80.0})
     assert len(caught.value.faults) == 1
 
 
-def test_the_page_reaches_no_file_elsewhere(home: Path, tmp_path: Path):
+def test_the_page_reaches_no_file_elsewhere(home, tmp_path):
     rig = home / "mine.yaml"
     rig.write_text(Path("config/rigs/desk.yaml").read_text())
     made = simulated(str(rig))

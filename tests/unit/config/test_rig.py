@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 from hypothesis import given, settings
@@ -19,13 +18,12 @@ from gazerig.config.parameters import (
     value_of,
 )
 from gazerig.config.schema import Rig, load_rig, load_rules, load_walk
-from gazerig.params import Declaration, declarations
-from gazerig.robot.model.parameter import Parameter
+from gazerig.params import declarations
 
 DESK = shipped_path("rigs", "desk")
 
 
-def broken(tmp_path: Path, *changes: tuple[str, str]) -> tuple[str, ...]:
+def broken(tmp_path, *changes):
     text = DESK.read_text(encoding="utf-8")
     for old, new in changes:
         assert len(re.findall(old, text, flags=re.M)) >= 1, old
@@ -55,7 +53,7 @@ def test_shipped_profiles_characters_and_walks_load():
 @pytest.mark.parametrize(
     ("key", "slip", "near"), [("character", "shi", "shy"), ("profile", "robott", "robot")]
 )
-def test_a_rig_names_its_profile_and_character(tmp_path: Path, key: str, slip: str, near: str):
+def test_a_rig_names_its_profile_and_character(tmp_path, key, slip, near):
     file, text = tmp_path / "mine.yaml", DESK.read_text(encoding="utf-8")
     text = text.replace("profile: robot ", "character: shy\nprofile: robot ")
     file.write_text(text, encoding="utf-8")
@@ -89,7 +87,7 @@ def test_a_rig_names_its_profile_and_character(tmp_path: Path, key: str, slip: s
         (r"left_deg: .*", "left_deg: [-25.0]", "lid_joints.left_deg", "a list of 2"),
     ],
 )
-def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_path: Path):
+def test_rules_between_sections(old, new, place, rule, tmp_path):
     faults = broken(tmp_path, (old, new))
     assert any(re.search(r"rig\.yaml:\d+", f) and place in f and rule in f for f in faults), faults
 
@@ -97,7 +95,7 @@ def test_rules_between_sections(old: str, new: str, place: str, rule: str, tmp_p
 # Rigs with other joints and other buses than the desk's: valid files, and the result
 
 
-def faults(tmp_path: Path, text: str) -> str:
+def faults(tmp_path, text):
     file = tmp_path / "wrong.yaml"
     file.write_text(text, encoding="utf-8")
     with pytest.raises(ConfigError) as caught:
@@ -144,7 +142,7 @@ def faults(tmp_path: Path, text: str) -> str:
         ("com_mm: [0, 0, 0]", "mass_kg: 0.01", "the head weighs 0.01 kg with all it carries"),
     ],
 )
-def test_what_cannot_be_is_said(tmp_path: Path, old: str, new: str, says: str):
+def test_what_cannot_be_is_said(tmp_path, old, new, says):
     text = mixed_text()
     assert old in text
     said = faults(tmp_path, text.replace(old, new, 1))
@@ -155,13 +153,11 @@ def test_what_cannot_be_is_said(tmp_path: Path, old: str, new: str, says: str):
 
 
 @pytest.fixture(scope="module")
-def knobs(desk_rig: Rig) -> tuple[Parameter, ...]:
+def knobs(desk_rig):
     return parameters(desk_rig, desk_rig)
 
 
-def test_all_have_words_and_structure_waits_for_the_next_start(
-    knobs: tuple[Parameter, ...], desk_rig: Rig
-):
+def test_all_have_words_and_structure_waits_for_the_next_start(knobs, desk_rig):
     waiting = {parameter.key for parameter in knobs if parameter.live == NEXT_START}
     assert {"bus.port", "joints.neck_yaw.id", "oak.rate_hz", "camera.mount", "name"} <= waiting
     live = {parameter.key for parameter in knobs} - waiting
@@ -184,9 +180,7 @@ def test_all_have_words_and_structure_waits_for_the_next_start(
 
 @settings(max_examples=30, deadline=None)
 @given(st.data())
-def test_any_number_within_its_bounds_comes_back_or_breaks_a_rule(
-    desk_rig: Rig, knobs: tuple[Parameter, ...], data: st.DataObject
-):
+def test_any_number_within_its_bounds_comes_back_or_breaks_a_rule(desk_rig, knobs, data):
     numbers = [k for k in knobs if k.kind in ("number", "whole") and k.low is not None]
     parameter = data.draw(st.sampled_from(numbers))
     assert parameter.low is not None and parameter.high is not None
@@ -206,7 +200,7 @@ def test_any_number_within_its_bounds_comes_back_or_breaks_a_rule(
 # --- One line declares a parameter; its unit is in its name
 
 
-def shapes(params: type) -> list[Declaration]:
+def shapes(params):
     found = list(declarations(params).values())
     for shape in list(found):
         inner = shape.inner or shape

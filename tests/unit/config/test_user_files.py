@@ -20,7 +20,7 @@ from gazerig.robot.recording.recorder import Recorder
 SECRET = "root:$6$abcdefgh:19000:0:99999:7:::\ndaemon:*:19000:0:99999:7:::\n"
 
 
-def refused(read: Callable[[], object]) -> str:
+def refused(read):
     """Return the message about a file that cannot be used: one line."""
     with pytest.raises((ConfigError, SetupError)) as reported:
         read()
@@ -30,7 +30,7 @@ def refused(read: Callable[[], object]) -> str:
 
 
 @pytest.fixture
-def pipe(tmp_path: Path) -> Path:
+def pipe(tmp_path):
     path = tmp_path / "pipe.yaml"
     os.mkfifo(path)
     return path
@@ -49,13 +49,11 @@ READERS: dict[str, Callable[[str], object]] = {
 
 
 @pytest.mark.parametrize("reader", READERS.values(), ids=READERS)
-def test_what_is_no_regular_file_is_refused_at_once(
-    reader: Callable[[str], object], pipe: Path, tmp_path: Path
-):
+def test_what_is_no_regular_file_is_refused_at_once(reader, pipe, tmp_path):
     assert "is a named pipe, not a regular file" in refused(lambda: reader(str(pipe)))
     for device in ("/dev/zero", "/dev/full", "/dev/tty", "/dev/null"):
         if os.path.exists(device):
-            assert "is a device" in refused(lambda device=device: reader(device))  # type: ignore[misc]
+            assert "is a device" in refused(lambda device=device: reader(device))
     folder = tmp_path / "folder.yaml"
     folder.mkdir()
     assert "is a directory" in refused(lambda: reader(str(folder)))
@@ -69,9 +67,7 @@ def test_what_is_no_regular_file_is_refused_at_once(
 
 
 @pytest.mark.parametrize("reader", READERS.values(), ids=READERS)
-def test_nothing_of_a_file_that_is_no_configuration_is_shown(
-    reader: Callable[[str], object], tmp_path: Path
-):
+def test_nothing_of_a_file_that_is_no_configuration_is_shown(reader, tmp_path):
     file = tmp_path / "secret.yaml"
     for text in (
         SECRET,
@@ -91,7 +87,7 @@ def test_nothing_of_a_file_that_is_no_configuration_is_shown(
         assert not any(word in said for word in ("hunter2", "root:", "daemon", "$6$")), said
 
 
-def test_yaml_is_bounded_in_size_and_stands_for_nothing_larger(tmp_path: Path):
+def test_yaml_is_bounded_in_size_and_stands_for_nothing_larger(tmp_path):
     file = tmp_path / "big.yaml"
     with file.open("wb") as big:
         big.truncate(100_000_000)
@@ -103,7 +99,7 @@ def test_yaml_is_bounded_in_size_and_stands_for_nothing_larger(tmp_path: Path):
     assert "not supported" in str(pytest.raises(ConfigError, load_rig, str(file)).value)
 
 
-def test_names_can_be_recorded(tmp_path: Path):
+def test_names_can_be_recorded(tmp_path):
     desk = (Path(__file__).parents[3] / "config/rigs/desk.yaml").read_text()
     file = tmp_path / "rig.yaml"
     file.write_text(desk.replace("name: desk", r'name: "\ud800"', 1))
@@ -114,7 +110,7 @@ def test_names_can_be_recorded(tmp_path: Path):
 # -- writing ---------------------------------------------------------------------------
 
 
-def test_what_is_there_is_kept_unless_forced(tmp_path: Path):
+def test_what_is_there_is_kept_unless_forced(tmp_path):
     file = tmp_path / "file"
     write_file(file, "old")
     with pytest.raises(SetupError, match="already exists: name another file, or use --force"):
@@ -126,7 +122,7 @@ def test_what_is_there_is_kept_unless_forced(tmp_path: Path):
     assert os.listdir(tmp_path) == ["file"]
 
 
-def test_what_fails_half_way_leaves_the_old_file(tmp_path: Path):
+def test_what_fails_half_way_leaves_the_old_file(tmp_path):
     file = tmp_path / "file"
     file.write_text("old")
     with pytest.raises(RuntimeError), output_file(file, force=True) as out:
@@ -135,7 +131,7 @@ def test_what_fails_half_way_leaves_the_old_file(tmp_path: Path):
     assert file.read_text() == "old" and os.listdir(tmp_path) == ["file"]
 
 
-def test_a_link_is_followed_and_stays_one(tmp_path: Path):
+def test_a_link_is_followed_and_stays_one(tmp_path):
     file, link = tmp_path / "file", tmp_path / "link"
     file.write_text("old")
     link.symlink_to(file)
@@ -146,7 +142,7 @@ def test_a_link_is_followed_and_stays_one(tmp_path: Path):
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_a_named_pipe_a_device_or_a_socket_is_refused_at_once(pipe: Path, force: bool):
+def test_a_named_pipe_a_device_or_a_socket_is_refused_at_once(pipe, force):
     link = pipe.with_name("link.yaml")
     link.symlink_to("/dev/full")
     with socket.socket(socket.AF_UNIX) as server:
@@ -166,7 +162,7 @@ def test_a_named_pipe_a_device_or_a_socket_is_refused_at_once(pipe: Path, force:
                 assert f"{path} is {what}: name a file" in refused(write)
 
 
-def test_a_full_disk_leaves_the_old_file_whole(tmp_path: Path, small_disk: None):
+def test_a_full_disk_leaves_the_old_file_whole(tmp_path, small_disk):
     file = tmp_path / "file"
     file.write_text("old")
     with pytest.raises(SetupError, match="File too large"):
@@ -189,9 +185,7 @@ def test_a_full_disk_leaves_the_old_file_whole(tmp_path: Path, small_disk: None)
     ],
     ids=lambda words: words[0] + words[-1][:9],
 )
-def test_no_command_writes_over_a_file_of_yours(
-    words: tuple[str, ...], tmp_path: Path, capfd: pytest.CaptureFixture[str]
-):
+def test_no_command_writes_over_a_file_of_yours(words, tmp_path, capfd):
     for ending in (".png", ".png.html"):
         (tmp_path / f"mine{ending}").write_text("precious")
     mine = str(tmp_path / "mine.png")

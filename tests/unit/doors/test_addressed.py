@@ -6,26 +6,25 @@ from typing import Any
 import pytest
 from aiohttp import ClientSession
 from fakes.neighbours import RealtimeServer, event, rtvi, run
-from fakes.talking_head import TalkingHead, until
+from fakes.talking_head import until
 from fakes.voice_assistant import Assistant, free_port, lva
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 
 from gazerig.doors import openai_realtime, pipecat, voice_assistant, wyoming
-from gazerig.doors.door import DoorLink
 
 
 @pytest.fixture(autouse=True)
-def look_often(monkeypatch: pytest.MonkeyPatch) -> None:
+def look_often(monkeypatch):
     for name in ("FIRST_WAIT_S", "_WATCH_S", "_LOOK_S"):
         monkeypatch.setattr(f"gazerig.doors.door.{name}", 0.02)
 
 
 @pytest.mark.parametrize("addressed", [True, False])
-def test_a_voice_assistant_listens_when_the_head_does_not_speak(addressed: bool):
+def test_a_voice_assistant_listens_when_the_head_does_not_speak(addressed):
     assistant = Assistant()
 
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+    async def scenario(link, head):
         async with assistant:
             await until(lambda: assistant.sockets)
             head.addressed_by = 3
@@ -58,10 +57,10 @@ def test_a_satellite_detects_a_look_as_its_wake_word():
     port = free_port()
     shape = {"rate": 16000, "width": 2, "channels": 1}
 
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+    async def scenario(link, head):
         async with AsyncTcpClient("127.0.0.1", port) as wake:
 
-            async def read() -> Any:
+            async def read():
                 answer = await asyncio.wait_for(wake.read_event(), 20.0)
                 assert answer is not None
                 return answer
@@ -99,7 +98,7 @@ def test_a_satellite_detects_a_look_as_its_wake_word():
 def test_a_pipecat_client_receives_a_message_for_the_bot():
     bind = f"127.0.0.1:{free_port()}"
 
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+    async def scenario(link, head):
         async with ClientSession() as session:
             client = await session.ws_connect(f"ws://{bind}")
             first = await client.receive_json(timeout=20.0)
@@ -123,10 +122,10 @@ CAREFUL = {"type": "server_vad", "interrupt_response": False}
 
 
 @pytest.mark.parametrize("beta", [False, True])
-def test_a_realtime_session_detects_turns_while_addressed(beta: bool):
+def test_a_realtime_session_detects_turns_while_addressed(beta):
     """The program's own turn detection is kept, and a turn that was begun is heard to its end."""
 
-    def update(detection: object, kind: str = "session.update") -> dict[str, Any]:
+    def update(detection, kind="session.update"):
         session: dict[str, Any] = {"turn_detection": detection}
         if not beta:
             session = {"type": "realtime", "audio": {"input": session}}
@@ -134,13 +133,13 @@ def test_a_realtime_session_detects_turns_while_addressed(beta: bool):
 
     server, bind = RealtimeServer(update(SEMANTIC, "session.created")), f"127.0.0.1:{free_port()}"
 
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
-        async def receives(*messages: object) -> None:
+    async def scenario(link, head):
+        async def receives(*messages):
             await until(lambda: len(server.received) >= len(messages))
             assert server.received == list(messages)
             server.received.clear()
 
-        async def receives_nothing() -> None:
+        async def receives_nothing():
             head.addressed_by = None
             await head.is_looked_at()
             await receives()

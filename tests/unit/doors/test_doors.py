@@ -3,9 +3,7 @@
 import asyncio
 import re
 import socket
-from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import pytest
 from aiohttp import ClientSession, WSServerHandshakeError
@@ -19,7 +17,7 @@ from fakes.neighbours import (
     run,
     talk_in_a_room,
 )
-from fakes.talking_head import TalkingHead, until
+from fakes.talking_head import until
 from fakes.voice_assistant import Assistant, free_port, lva
 
 pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
@@ -27,12 +25,11 @@ pytest.importorskip("gazerig.doors", reason="the folder doors was removed")
 import gazerig
 from gazerig.doors import livekit, openai_realtime, pipecat, voice_assistant, wyoming
 from gazerig.doors.door import Address, Door, DoorLink
-from gazerig.doors.turn_taking import Orders
 from gazerig.drivers.plugins import DOOR, SHIPPED, find
 from gazerig.robot.run.doors import load_door
 
 
-def brief(orders: Orders) -> list[Any]:
+def brief(orders):
     """Return orders as names; those of speech with their known duration or the text's length."""
     return [
         (o.state, o.seconds) if o.seconds is not None
@@ -42,7 +39,7 @@ def brief(orders: Orders) -> list[Any]:
 
 
 @pytest.mark.parametrize("name", MAKERS)
-def test_messages_become_orders(name: str):
+def test_messages_become_orders(name):
     messages, door = conversation(name), MAKERS[name][0]()
     assert [brief(door.take(message, 10.0)) for message, _ in messages] == [
         orders for _, orders in messages
@@ -61,12 +58,12 @@ def test_played_speech_ends_by_its_length():
 # A neighbour on this computer
 
 
-def test_a_voice_assistant_is_followed_and_found_again(monkeypatch: pytest.MonkeyPatch):
+def test_a_voice_assistant_is_followed_and_found_again(monkeypatch):
     """It is not there at first; it sends nonsense, a flood, and closes; it returns."""
     monkeypatch.setattr("gazerig.doors.door.FIRST_WAIT_S", 0.1)
     assistant = Assistant()
 
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+    async def scenario(link, head):
         assert re.match("waiting for a Linux Voice Assistant at ws.*: .* failed", head.said[0])
         async with assistant:
             await until(lambda: assistant.sockets)
@@ -94,7 +91,7 @@ def test_web_pages_are_refused_and_programs_are_not():
         f"http://127.0.0.1:{port}.a.example", f"http://a.example:{port}",
     )  # fmt: skip
 
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+    async def scenario(link, head):
         async with ClientSession() as session:
             for origin in refused:
                 with pytest.raises(WSServerHandshakeError, match="403"):
@@ -112,7 +109,7 @@ def test_realtime_sessions_are_relayed_with_their_key():
     """The server sees the program's key and question; the program, the server's events."""
     server, bind = RealtimeServer(event("session.created")), f"127.0.0.1:{free_port()}"
 
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+    async def scenario(link, head):
         url, key = f"ws://{bind}/v1/realtime?model=m", {"Authorization": "Bearer hush"}
         async with ClientSession() as session:
             with pytest.raises(WSServerHandshakeError, match="502"):
@@ -164,11 +161,11 @@ def test_a_satellite_s_sound_is_said_and_reported_as_played():
     pcm = bytes(range(256)) * 50  # .4 s
     shape = {"rate": 16000, "width": 2, "channels": 1}
 
-    async def play(client: Any, pcm: bytes, *end: Any) -> None:
+    async def play(client, pcm, *end):
         for one in (AudioStart(**shape), AudioChunk(**shape, audio=pcm), *end):
             await client.write_event(one.event())
 
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+    async def scenario(link, head):
         async with (
             AsyncTcpClient("127.0.0.1", port) as sounds, AsyncTcpClient("127.0.0.1", port) as events
         ):  # fmt: skip
@@ -210,11 +207,11 @@ def test_a_satellite_s_sound_is_said_and_reported_as_played():
      b'{"type": "audio-chunk", "data": {"rate": 0, "width": 2, "channels": 1},'
      b' "payload_length": 2}\nxx'],
 )  # fmt: skip
-def test_a_stranger_at_the_satellite_s_port_is_disconnected(sent: bytes):
+def test_a_stranger_at_the_satellite_s_port_is_disconnected(sent):
     pytest.importorskip("wyoming", reason="it is in the extra doors")
     port = free_port()
 
-    async def scenario(link: DoorLink, head: TalkingHead) -> None:
+    async def scenario(link, head):
         reader, writer = await asyncio.open_connection("127.0.0.1", port)
         writer.write(sent)
         assert await reader.read() == b""
@@ -231,7 +228,7 @@ def test_a_stranger_at_the_satellite_s_port_is_disconnected(sent: bytes):
 def test_an_agent_in_a_room_steers_the_head_and_is_told_who_addresses_it():
     calls: list[str] = []
 
-    async def perform_rpc(*, destination_identity: str, method: str, payload: str) -> str:
+    async def perform_rpc(*, destination_identity, method, payload):
         calls.append(f"{destination_identity} {method}")
         if method == "end_turn":
             raise RuntimeError("Method not supported at destination")
@@ -243,7 +240,7 @@ def test_an_agent_in_a_room_steers_the_head_and_is_told_who_addresses_it():
     assert sum("register start_turn, end_turn and cancel_turn" in line for line in head.said) == 1
 
 
-def test_a_room_needs_an_address_and_a_token(monkeypatch: pytest.MonkeyPatch):
+def test_a_room_needs_an_address_and_a_token(monkeypatch):
     monkeypatch.delenv("LIVEKIT_URL", raising=False)
     link = DoorLink(lambda: None, print)
     with pytest.raises(gazerig.Error, match="set LIVEKIT_URL"):
@@ -263,12 +260,10 @@ def test_doors_listen_on_this_computer_unless_told_otherwise():
         assert not door.bind or Address.parse(door.bind).host == "127.0.0.1"
 
 
-def test_a_door_names_who_can_reach_it_and_a_port_that_is_taken(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_door_names_who_can_reach_it_and_a_port_that_is_taken(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
 
-    async def serve(link: DoorLink) -> None:
+    async def serve(link):
         link.report(f"{link.address} {link.bind}")
 
     said: list[str] = []

@@ -1,35 +1,31 @@
 """The action planner of a boxing match: guard, attack or wait, from what is seen."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import hypot, inf
-from typing import Any
 
 import numpy as np
 import pytest
-from attention_scene import Row, attention, body, looking, percept
+from attention_scene import attention, body, looking, percept
 from msgspec import structs
 
 from gazerig.config.schema import load_rules
 from gazerig.gaze.attention.action_planner import (
     ActionPlanner,
-    Plan,
     SeenHand,
     approaches,
     hit_places,
 )
-from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.top_down import PLANNED, TopDownParams
-from gazerig.gaze.types import Face, Percept, Target, Vec3
+from gazerig.gaze.types import Face
 
-EYE: Vec3 = (0.0, 0.0, 0.0)
-NOSE: Vec3 = (1.0, 0.0, 0.0)
+EYE = (0.0, 0.0, 0.0)
+NOSE = (1.0, 0.0, 0.0)
 TOWARDS = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
 LEFT, RIGHT = (0.88, 0.12, -0.13), (0.88, -0.12, -0.13)  # fists before the chin
 DT_S = 1.0 / 30.0
 
 
-def face(nose: Vec3 = NOSE) -> Face:
+def face(nose=NOSE):
     x, y, z = nose
     hit_places = {"DN": (0.0, -0.1), "FL": (0.06, 0.0), "LE": (0.03, 0.03), "M": (0.0, -0.06),
               "N": (0.0, 0.0), "FR": (-0.06, 0.0), "RE": (-0.03, 0.03), "UP": (0.0, 0.1)}  # fmt: skip
@@ -37,39 +33,39 @@ def face(nose: Vec3 = NOSE) -> Face:
     return Face(1, nose, (0.0, 0.0, 0.0), TOWARDS, parts, 0.98)
 
 
-def seen(t_s: float, *rows: Row, nose: Vec3 | None = NOSE) -> Percept:
+def seen(t_s, *rows, nose=NOSE):
     if nose is None:
         return percept(t_s, *rows)
     found = percept(t_s, body(1, "face", nose), *rows)
     return structs.replace(found, faces=(face(nose),))
 
 
-def fist(id: int, p: Vec3, v: Vec3 = (0.0, 0.0, 0.0)) -> Row:
+def fist(id, p, v=(0.0, 0.0, 0.0)):
     return body(id, "hand", p, v)
 
 
-def guarding(t_s: float) -> Percept:
+def guarding(t_s):
     return seen(t_s, fist(2, LEFT), fist(3, RIGHT))
 
 
-def punch(t_s: float, away_m: float = 0.8, speed_m_s: float = 2.5, aside_m: float = 0.0) -> Percept:
+def punch(t_s, away_m=0.8, speed_m_s=2.5, aside_m=0.0):
     return seen(t_s, fist(2, LEFT), fist(3, (away_m, -0.02 + aside_m, 0.0), (-speed_m_s, 0.0, 0.0)))
 
 
 class Bout:
     """A planner that sees one frame after the other."""
 
-    def __init__(self) -> None:
+    def __init__(self):
         self.planner, self.frame = ActionPlanner(), 0
 
-    def see(self, shown: Callable[..., Percept], frames: int, *more: Row, **how: Any) -> list[Plan]:
+    def see(self, shown, frames, *more, **how):
         """See frames of what is shown at their times; return the plans."""
         first, self.frame = self.frame, self.frame + frames
         times = [k * DT_S for k in range(first, self.frame)]
         return [self.planner.step(shown(t, *more, **how), EYE, t) for t in times]
 
 
-def actions(plans: list[Plan]) -> set[str]:
+def actions(plans):
     return {plan.action for plan in plans}
 
 
@@ -119,7 +115,7 @@ def test_a_fist_has_come_on_since_its_picture_was_made():
         {"away_m": 3.0, "speed_m_s": 2.5},
     ],
 )
-def test_what_is_no_punch_is_not_guarded_against(comes: dict[str, float]):
+def test_what_is_no_punch_is_not_guarded_against(comes):
     assert actions(Bout().see(punch, 10, **comes)) == {"wait"}
 
 
@@ -142,13 +138,13 @@ def test_guard_lasts_its_shortest_time_and_a_slower_fist_does_not_end_it():
     assert 0.3 - 2 * DT_S < kept * DT_S < 0.3 + DT_S
 
 
-def opened(t_s: float, *more: Row, parted: bool) -> Percept:
+def opened(t_s, *more, parted):
     z, y = (0.05, 0.25) if parted else (-0.45, 0.16)
     return seen(t_s, *more, fist(2, (0.9, y, z)), fist(3, (0.9, -y, z)))
 
 
 @pytest.mark.parametrize("parted", [True, False])
-def test_an_open_place_is_attacked_once_and_again_after_a_rest(parted: bool):
+def test_an_open_place_is_attacked_once_and_again_after_a_rest(parted):
     bout = Bout()
     assert actions(bout.see(guarding, 9)) == {"wait"}
     plans = bout.see(opened, 75, parted=parted)
@@ -174,7 +170,7 @@ def test_an_opponent_has_two_hands_and_a_third_that_comes_later_protects_nothing
 
 
 @pytest.mark.parametrize(("v_z_m_s", "opens"), [(-1.2, True), (-0.3, False), (1.2, False)])
-def test_hands_that_dropped_out_of_the_picture_leave_the_face_open(v_z_m_s: float, opens: bool):
+def test_hands_that_dropped_out_of_the_picture_leave_the_face_open(v_z_m_s, opens):
     """Those that were at rest or on their return to the guard when they were lost still do."""
     bout, v = Bout(), (0.0, 0.0, v_z_m_s)
     bout.see(guarding, 9)
@@ -203,11 +199,11 @@ def test_a_gap_without_frames_ends_what_was_under_way():
 # The same through attention.
 
 
-def planned_attention(planner: bool = True) -> Attention:
+def planned_attention(planner=True):
     return attention(replace(load_rules("boxing"), planner=planner))
 
 
-def looks(model: Attention, percepts: list[Percept]) -> list[Target]:
+def looks(model, percepts):
     return [model.choose(one, looking(), one.captured_s) for one in percepts]
 
 

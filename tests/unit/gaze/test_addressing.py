@@ -1,21 +1,19 @@
 """Who addresses the head: looks, their end, talk among people, posters, several people."""
 
-from typing import Any
-
 import pytest
 from attention_scene import body, percept
 from msgspec.structs import replace
 
 from gazerig.gaze.angles import rotation, sub, yaw_pitch
-from gazerig.gaze.attention.addressing import Addressing, AddressingModel
-from gazerig.gaze.types import Face, Percept, Vec3
+from gazerig.gaze.attention.addressing import AddressingModel
+from gazerig.gaze.types import Face
 
-HEAD: Vec3 = (0.0, 0.0, 0.2)
+HEAD = (0.0, 0.0, 0.2)
 ANN, BEN = (1.2, 0.5, 0.3), (1.2, -0.5, 0.3)
 RATE_HZ = 20
 
 
-def face(id: int, p: Vec3, at: Vec3 = HEAD, **fields: Any) -> Face:
+def face(id, p, at=HEAD, **fields):
     """Return a face that is turned to a point."""
     R = rotation((*yaw_pitch(sub(at, p)), 0.0))
     looks = {"looks_at_head": at is HEAD, "off_head_rad": 0.0 if at is HEAD else 1.2}
@@ -23,20 +21,20 @@ def face(id: int, p: Vec3, at: Vec3 = HEAD, **fields: Any) -> Face:
     return Face(id, p, (0.0, 0.0, 0.0), R, (p,) * 8, 0.9, **given)
 
 
-def seen(t_s: float, *faces: Face, hidden: bool = False) -> Percept:
+def seen(t_s, *faces, hidden=False):
     """Return a frame of faces; hidden: with Ben, whose face is not visible."""
     rows = [body(one.id, "face", one.p_world_m) for one in faces]
     rows += [body(2, "face", BEN)] * hidden
     return replace(percept(t_s, *rows), faces=faces)
 
 
-def play(model: AddressingModel, seconds: float, start_s: float, *faces: Face, **other: Any):
+def play(model, seconds, start_s, *faces, **other):
     """Show the same frame for some time; return what each tick of it reports."""
     times = [start_s + k / RATE_HZ for k in range(round(seconds * RATE_HZ))]
     return [model.step(seen(t, *faces, **other), HEAD, t) for t in times]
 
 
-def first(found: list[tuple[Addressing, ...]]) -> list[int | None]:
+def first(found):
     return [one[0].person if one else None for one in found]
 
 

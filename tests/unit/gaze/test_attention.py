@@ -1,31 +1,24 @@
 """Field of view, eq 1, rules and the winner (Mitake et al.)."""
 
-from collections.abc import Callable
 from itertools import groupby
 from math import exp, hypot, inf, pi, radians, sin
 
 import numpy as np
 import pytest
-from attention_scene import FACE, Row, attention, body, look, looking, percept, salience, waving
+from attention_scene import FACE, attention, body, look, looking, percept, salience, waving
 from msgspec import structs
 
-from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp, BottomUpParams, motion_terms, saturate
 from gazerig.gaze.attention.top_down import Rule, TopDownParams
 from gazerig.gaze.field_of_view import visible_bodies
-from gazerig.gaze.types import Bodies, Salience, Target
+from gazerig.gaze.types import Salience
 
 
-def test_e45_eq_1_does_not_depend_on_the_length_of_e():
-    rng = np.random.default_rng(1)
-    for v, w, e in rng.normal(size=(40, 3, 3)):
-        assert motion_terms(v, w, 5.0 * e) == pytest.approx(motion_terms(v, w, e), abs=1e-9)
-
-
-def test_terms_of_eq_1_are_translation_looming_and_rotation():
-    v, w, ahead = (1.0, 2.0, 0.0), (3.0, 0.0, 4.0), (2.0, 0.0, 0.0)
-    assert motion_terms(v, w, ahead) == pytest.approx((2.0, -1.0, 3.0))
-    assert motion_terms((-1.0, 2.0, 0.0), w, ahead) == pytest.approx((2.0, 1.0, 3.0))
+def test_e45_terms_of_eq_1_do_not_depend_on_the_length_of_e():
+    v, w = (1.0, 2.0, 0.0), (3.0, 0.0, 4.0)
+    for length in (1.0, 5.0):
+        assert motion_terms(v, w, (length, 0.0, 0.0)) == pytest.approx((2.0, -1.0, 3.0))
+        assert motion_terms(v, w, (-length, 0.0, 0.0)) == pytest.approx((2.0, 1.0, 3.0))
 
 
 def test_motion_saturates_unless_it_comes_nearer_fast():
@@ -41,7 +34,7 @@ def test_motion_saturates_unless_it_comes_nearer_fast():
     [(0, 0, True), (95, 0, True), (105, 0, False), (0, 55, True), (0, 65, False), (0, -70, True),
      (0, -80, False), (-95, 0, True), (70, 50, False), (180, 0, False)],
 )  # fmt: skip
-def test_field_of_both_eyes(yaw: float, pitch: float, seen: bool):
+def test_field_of_both_eyes(yaw, pitch, seen):
     y, p = radians(yaw), radians(pitch)
     far = (100 * np.cos(p) * np.cos(y), 100 * np.cos(p) * np.sin(y), 100 * np.sin(p))
     assert bool(visible_bodies(bodies(body(1, "x", far)).rows(), looking())) is seen
@@ -120,20 +113,19 @@ def test_behaviours_follow_their_rules_and_do_not_wait_for_the_end_of_a_fixation
         TopDownParams(behaviour="x", rules={"wait": Rule("face", 0.5)})
 
 
-def bodies(*rows: Row) -> Bodies:
+def bodies(*rows):
     return percept(0.0, *rows).bodies
 
 
 def test_literal_form_is_eq_1_as_printed_with_e_the_direction_of_gaze():
+    """Of bodies anywhere, with no smoothing, distance, reference or motion of the eye."""
     model = BottomUp(BottomUpParams(form="literal", reference=9.0))
-    seen = bodies(body(1, "x", (5, 3, 0), (1, 2, 0)), body(2, "x", (1, 0, 0), (1, 2, 0)))
-    seen = structs.replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0], [3.0, 0, 4.0]]))
-    for gaze in ((1.0, 0.0, 0.0), (7.0, 0.0, 0.0)):
-        saliences = salience(model, seen, 0.0, (1.0, 1.0, 1.0), gaze)
-        for term, value in zip(saliences, (2.0, 1.0, 3.0, 0.0, 6.0), strict=True):
-            assert term.tolist() == [value, value]
-    aside = salience(model, seen, 0.0, gaze=(0.0, 1.0, 0.0))
-    assert (aside.translation[0], aside.looming[0], aside.rotation[0]) == (1.0, 2.0, 0.0)
+    seen = bodies(body(1, "x", (5, 3, 0), (1, 2, 0)))
+    seen = structs.replace(seen, w_world_rad_s=np.array([[3.0, 0, 4.0]]))
+    for gaze, terms in (((7.0, 0.0, 0.0), (2, 1, 3, 0, 6)), ((0.0, 1.0, 0.0), (1, 2, 0, 0, 3))):
+        assert (
+            tuple(float(term[0]) for term in salience(model, seen, 0.0, (1, 1, 1), gaze)) == terms
+        )
 
 
 def test_the_heads_own_motion_makes_what_stands_still_slide():
@@ -161,7 +153,7 @@ def test_what_has_just_come_into_view_pulls_and_that_wears_off():
 
 @pytest.mark.parametrize(("gap_s", "onset"), [(0.1, 0.0), (0.29, 0.0), (0.4, 1.0)])
 @pytest.mark.parametrize("how", ["missed", "out of the field"])
-def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset: float):
+def test_a_blink_of_the_detector_makes_nothing_new(how, gap_s, onset):
     model = BottomUp(BottomUpParams())
     moving = bodies(body(1, "hand", (1, 0, 0), (0, 1, 0)))
     for k in range(21):
@@ -181,15 +173,13 @@ def test_a_blink_of_the_detector_makes_nothing_new(how: str, gap_s: float, onset
 # ---- Attention: rules, recorded decisions, and what moves beside a face.
 
 
-def by(
-    look_at: str, salience: float = 0.9, point_world_m: tuple[float, float, float] | None = None
-) -> Attention:
+def by(look_at, salience=0.9, point_world_m=None):
     rule = Rule(look_at, salience, point_world_m)
     return attention(TopDownParams(behaviour="wait", rules={"wait": rule}))
 
 
 @pytest.mark.parametrize(("salience", "urgent"), [(0.9, True), (0.8, False)])
-def test_what_a_strong_rule_names_is_urgent(salience: float, urgent: bool):
+def test_what_a_strong_rule_names_is_urgent(salience, urgent):
     assert look(by("point", salience, (1.0, 0.5, 0.6)), 0.0, FACE).urgent is urgent
 
 
@@ -212,7 +202,7 @@ def test_a_rule_may_name_a_place_with_or_without_bodies_about():
     [("id:x", None, 'e.g. "id:7"'), ("id:", None, 'e.g. "id:7"'), ("point", None, "go together"),
      ("face", (1.0, 0.0, 0.0), "go together")],
 )  # fmt: skip
-def test_a_rule_says_one_thing(look_at: str, point: tuple[float, float, float] | None, rule: str):
+def test_a_rule_says_one_thing(look_at, point, rule):
     with pytest.raises(ValueError, match=rule):
         Rule(look_at, 0.5, point)
 
@@ -230,19 +220,11 @@ def test_every_decision_carries_the_pulls_of_the_winner_and_the_next_three():
     assert len(look(model, 9.1, FACE).saliences) == 1
 
 
-# Bodies alone: a face with two fists at the chin, looked at 30 times a second. The tests of
-# Mitake et al. 4, with camera, tracker and head: test_behaviours.
+# A face and what moves beside it, looked at 30 times a second. The tests of Mitake et al. 4, with
+# camera, tracker and head: test_behaviours.
 
 
-def boxer() -> list[Row]:
-    return [
-        body(1, "face", (1.0, 0.0, 0.0)),
-        body(2, "hand", (0.88, 0.12, -0.15)),
-        body(3, "hand", (0.88, -0.12, -0.15)),
-    ]
-
-
-def lived(scene: Callable[[float], list[Row]], seconds: float) -> list[tuple[float, Target]]:
+def lived(scene, seconds):
     """Look at a scene of places; velocities are their differences."""
     model = attention()
     looks = []
@@ -257,36 +239,10 @@ def lived(scene: Callable[[float], list[Row]], seconds: float) -> list[tuple[flo
     return looks
 
 
-def moved(rows: list[Row], i: int, by: tuple[float, float, float]) -> list[Row]:
-    return [
-        (row[0], row[1], tuple(a + b for a, b in zip(row[2], by, strict=True)), row[3])
-        if row[0] == i
-        else row
-        for row in rows
-    ]
-
-
-def first(looks: list[tuple[float, Target]], kind: str, after_s: float) -> float:
-    return next(t for t, look in looks if t >= after_s and look.kind == kind) - after_s
-
-
-@pytest.mark.parametrize(("from_s", "looked"), [(0.5, False), (2.8, True)])
-def test_a_sign_that_reaches_the_face_is_no_wave(from_s: float, looked: bool):
-    """The hand of one who has signed for long is not looked at, that of one who begins is."""
-
-    def signs(t: float) -> list[Row]:
-        up = 0.1 * sin(2 * pi * 1.5 * t) - 0.1 if t >= from_s else -0.1
-        raised = 0.25 * sin(pi * (t - 3.0) / 0.7) if 3.0 <= t < 3.7 else 0.0
-        return moved(boxer(), 2, (0.0, 0.0, up + raised))
-
-    looks = lived(signs, 4.0)
-    assert any(look.kind == "hand" for t, look in looks if t >= 3.0) is looked
-
-
 def test_something_that_keeps_moving_behind_a_person_gets_a_glance():
-    def moving(t: float) -> list[Row]:
+    def moving(t):
         swing = 0.6 * sin(2 * pi * 0.5 * (t - 2.0)) if t >= 2.0 else 0.0
-        return [boxer()[0], body(4, "thing", (1.5, 1.0 + swing, 0.0))]
+        return [FACE, body(4, "thing", (1.5, 1.0 + swing, 0.0))]
 
     away = [t for t, look in lived(moving, 8.0) if look.kind == "thing"]
     assert away and 2.0 <= away[0] <= 2.5
@@ -294,9 +250,9 @@ def test_something_that_keeps_moving_behind_a_person_gets_a_glance():
 
 
 def test_onsets_that_follow_each_other_lose_their_salience():
-    def flickering(t: float) -> list[Row]:
+    def flickering(t):
         seen = t >= 2.0 and t % 1.0 < 0.5
-        return [boxer()[0], *([body(int(9 + t), "thing", (1.5, 1.0, 0.0))] if seen else [])]
+        return [FACE, *([body(int(9 + t), "thing", (1.5, 1.0, 0.0))] if seen else [])]
 
     away = [t for t, look in lived(flickering, 13.0) if look.kind == "thing"]
     assert away and away[0] < 2.1
@@ -314,7 +270,7 @@ def test_a_lifeless_face_gets_a_small_share_and_is_not_remembered():
 
 
 @pytest.mark.parametrize("count", [10, 30])
-def test_nothing_but_a_face_is_new_soon_after_somebody_has_come(count: int):
+def test_nothing_but_a_face_is_new_soon_after_somebody_has_come(count):
     model = attention()
     for k in range(count):
         look(model, k / 10, FACE)

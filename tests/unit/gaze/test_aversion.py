@@ -15,17 +15,16 @@ from gazerig.gaze.attention.conversation import (
     AversionParams,
     ConversationGaze,
     ConversationParams,
-    LooksAway,
 )
-from gazerig.gaze.types import Salience, Target, TurnState, Vec3
+from gazerig.gaze.types import Salience, Vec3
 
 DT = 0.02
-HEAD: Vec3 = (0.05, 0.0, 0.2)
-FACE: Vec3 = (1.2, 0.1, 0.35)
-EYE: Vec3 = (1.2, 0.13, 0.38)
+HEAD = (0.05, 0.0, 0.2)
+FACE = (1.2, 0.1, 0.35)
+EYE = (1.2, 0.13, 0.38)
 
 
-def face(shift: int = 1, name: int = 4) -> Target:
+def face(shift=1, name=4):
     eye = target(EYE, (0.0, 0.1, 0.0), id=name, shift=shift, centre=FACE)
     return replace(eye, part="LE", why="left eye of face 4")
 
@@ -34,24 +33,20 @@ ATTENTION: Any = SimpleNamespace(converse=lambda *of: None, search=None)
 PARAMS = AversionParams(), ConversationParams()
 
 
-def aversion(
-    seed: int = 0, looks_away: LooksAway = "people", mode: str = "none"
-) -> ConversationGaze:
+def aversion(seed=0, looks_away="people", mode="none"):
     rngs = (np.random.default_rng((seed, n)) for n in range(2))
     model = ConversationGaze(looks_away, *PARAMS, ATTENTION, *rngs)
     model.choose_mode(mode, 0.0)
     return model
 
 
-def kinds(
-    model: ConversationGaze, start_s: float, seconds: float, ordered: bool = False
-) -> list[str]:
+def kinds(model, start_s, seconds, ordered=False):
     """Return what is looked at in each tick of a time with one face."""
     times = [start_s + k * DT for k in range(round(seconds / DT))]
     return [model.look(face(), HEAD, t, ordered=ordered).kind for t in times]
 
 
-def leaves_at(model: ConversationGaze) -> float:
+def leaves_at(model):
     """Return when the gaze leaves the face for the first time."""
     t = 0.0
     while model.look(face(), HEAD, t).kind == "face":
@@ -67,7 +62,7 @@ class Stay(NamedTuple):
     place: Vec3
 
 
-def stays(model: ConversationGaze, seconds: float, dt: float = DT) -> list[Stay]:
+def stays(model, seconds, dt=DT):
     """Run on one face and give the complete stays."""
     found, since = [], 0.0
     first = model.look(face(), HEAD, 0.0)
@@ -87,7 +82,7 @@ def test_who_never_looks_away_passes_targets_untouched():
         assert model.look(seen, HEAD, k * DT) is seen
 
 
-def angles_and_ways(model: ConversationGaze, seconds: float) -> tuple[np.ndarray, np.ndarray]:
+def angles_and_ways(model, seconds):
     """Return distance and direction of the stays, 0 right and 90 up, degrees."""
     to_face = unit(sub(FACE, HEAD))
     found = [s.place for s in stays(model, seconds, 0.1) if s.kind == "away"]
@@ -157,7 +152,7 @@ def test_every_place_and_return_is_one_new_shift_and_the_count_never_falls():
 
 
 @pytest.mark.parametrize("state", ["thinking", "speaking"])
-def test_the_look_away_of_a_turn_goes_on_with_another_partner(state: TurnState):
+def test_the_look_away_of_a_turn_goes_on_with_another_partner(state):
     model = aversion(15)
     model.look(face(), HEAD, 0.0)
     model.enter(state, 5, None, 0.0, 0.0)

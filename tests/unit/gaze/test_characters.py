@@ -2,44 +2,37 @@
 
 from dataclasses import replace
 from math import pi, sin
-from pathlib import Path
 
 import numpy as np
 import pytest
+from attention_scene import body, looking, percept
 
 from gazerig.config.load import read_yaml, shipped_names, shipped_path
-from gazerig.config.rig import GazeConfig
 from gazerig.config.schema import load_rig
-from gazerig.gaze.angles import rotation
 from gazerig.gaze.attention.attention import Attention
 from gazerig.gaze.attention.bottom_up import BottomUp
 from gazerig.gaze.attention.idle import Idle
 from gazerig.gaze.attention.top_down import TopDown
-from gazerig.gaze.types import Bodies, GazeState, Percept
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 CHARACTERS = shipped_names("characters")
-AHEAD = GazeState(
-    (0, 0, 0), (0, 0, 0), (0, 0), (0, 0), rotation((0.0, 0.0, 0.0)),
-    (0, 0, 0), (0, 0.03, 0), (0, -0.03, 0), 1.0, 1.0,
-)  # fmt: skip
 
 
-def hands_about_a_face(t_s: float) -> Percept:
+def hands_about_a_face(t_s):
     """Show a face that sways a little, and two raised hands that move for a while now and then."""
     w = 2 * pi * np.array([0.15, 0.9, 1.3])
     # Bursts of all sizes: from hardly a motion to a wild wave, never in step.
     size = np.array([0.01, 0.12 * max(0.0, sin(0.31 * t_s)) ** 2, 0.2 * sin(0.17 * t_s) ** 4])
-    p = np.array([[1.0, 0.0, 0.0], [0.8, 0.3, -0.05], [0.85, -0.3, -0.05]])
-    v = np.zeros((3, 3))
-    p[:, 1] += size * np.sin(w * t_s)
-    v[:, 1] = size * w * np.cos(w * t_s)
-    ids, kinds = (1, 2, 3), ("face", "hand", "hand")
-    return Percept(t_s, Bodies(ids, kinds, p, v, np.zeros((3, 3)), np.full(3, 0.08)))
+    aside, speed = size * np.sin(w * t_s), size * w * np.cos(w * t_s)
+    rows = ((1.0, 0.0, 0.0), (0.8, 0.3, -0.05), (0.85, -0.3, -0.05))
+    return percept(t_s, *(
+        body(k + 1, "hand" if k else "face", (x, y + aside[k], z), (0.0, speed[k], 0.0))
+        for k, (x, y, z) in enumerate(rows)
+    ))  # fmt: skip
 
 
-def face_share(gaze: GazeConfig) -> float:
+def face_share(gaze):
     rng = np.random.default_rng(0)
     model = Attention(
         replace(gaze.attention, reaction="none"),
@@ -50,17 +43,17 @@ def face_share(gaze: GazeConfig) -> float:
         rng,
     )
     times = [k / 15 for k in range(900)]
-    kinds = [model.choose(hands_about_a_face(t), AHEAD, t).kind for t in times]
+    kinds = [model.choose(hands_about_a_face(t), looking(), t).kind for t in times]
     return kinds.count("face") / len(kinds)
 
 
 @pytest.mark.parametrize("name", CHARACTERS)
-def test_a_character_lies_over_the_desk_rig_and_changes_all_it_names(name: str):
+def test_a_character_lies_over_the_desk_rig_and_changes_all_it_names(name):
     plain, other = load_rig("desk"), load_rig("desk", name)
     assert other.gaze != plain.gaze
     assert replace(other, gaze=plain.gaze) == plain  # manners only, never wires or limits
 
-    def differ(given: object, before: object, after: object, key: str) -> int:
+    def differ(given, before, after, key):
         if not isinstance(given, dict):
             assert before != after, f"{key} says nothing new"
             return 1
@@ -89,7 +82,7 @@ def test_the_bold_look_at_a_face_more_than_the_shy():
     assert shy < bold - 0.1
 
 
-def test_a_rig_of_its_own_rules_keeps_them_alone_under_a_character(tmp_path: Path):
+def test_a_rig_of_its_own_rules_keeps_them_alone_under_a_character(tmp_path):
     own = tmp_path / "own.yaml"
     text = shipped_path("rigs", "maker").read_text()
     rule = "gaze:\n  top_down: {rules: {wait: {look_at: face, salience: 0.9}}}\n"

@@ -1,25 +1,23 @@
 """Conversation: the state that a voice agent reports, its end, and what the gaze makes of it."""
 
 from math import inf
-from typing import Any
 
 import msgspec
 import pytest
-from commanded_robot import Running
 
 import gazerig
 from gazerig.gaze.attention.conversation import NOD
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
 from gazerig.robot.loop.client_control import Conversation
 from gazerig.robot.loop.head_state import HeadState, head_state
-from gazerig.robot.model.commands import LookAt, Renew, Talk, TalkOrder
-from gazerig.robot.model.reply import CommandReply, ConversationState
+from gazerig.robot.model.commands import LookAt, Renew, Talk
+from gazerig.robot.model.reply import CommandReply
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
-def test_states_follow_each_other_and_are_in_tick_and_state(running: Running):
-    def talk(state: TalkOrder, partner: int | None = None, **more: Any) -> ConversationState:
+def test_states_follow_each_other_and_are_in_tick_and_state(running):
+    def talk(state, partner=None, **more):
         return running.do(Talk(state, partner, who="a", stay=True, **more))[1][-1].conversation
 
     person = talk("listening", 1)
@@ -51,14 +49,14 @@ def test_states_follow_each_other_and_are_in_tick_and_state(running: Running):
         (Talk("listening", stay=True), inf, ""),
     ],
 )
-def test_a_state_ends_without_its_program(given: Talk, lasts_s: float, reason: str):
+def test_a_state_ends_without_its_program(given, lasts_s, reason):
     conversation = Conversation()
     conversation.report(given, 5.0)
     assert conversation.expiry_reason(5.0 + min(lasts_s, 3600.0) - 0.03) == ""
     assert reason in conversation.expiry_reason(5.0 + min(lasts_s, 3600.0) + 0.03)
 
 
-def test_an_end_is_told_once_and_the_gaze_goes_on(running: Running):
+def test_an_end_is_told_once_and_the_gaze_goes_on(running):
     running.do(Talk("speaking", seconds=9.0, who="a"))
     ticks = running.go(1.5)
     assert ticks[-1].conversation.end_reason == "not renewed"
@@ -66,7 +64,7 @@ def test_an_end_is_told_once_and_the_gaze_goes_on(running: Running):
     assert ticks[-1].target.kind in ("face", "away")
 
 
-def test_one_heartbeat_renews_gaze_and_conversation_of_one_client(running: Running):
+def test_one_heartbeat_renews_gaze_and_conversation_of_one_client(running):
     running.do(LookAt((1.0, 0.0, 0.3), who="a"))
     running.do(Talk("listening", who="a"))
     for _ in range(4):
@@ -78,7 +76,7 @@ def test_one_heartbeat_renews_gaze_and_conversation_of_one_client(running: Runni
     assert not running.do(Renew(who="a"))[0].refused  # it still has the conversation
 
 
-def test_the_newer_of_two_agents_has_the_conversation(running: Running):
+def test_the_newer_of_two_agents_has_the_conversation(running):
     running.do(Talk("speaking", seconds=5.0, who="a"))
     ticks = running.do(Talk("listening", who="b"))[1]
     assert [text for one in ticks for text in one.events] == ["conversation: b takes over from a"]
@@ -91,7 +89,7 @@ def test_the_newer_of_two_agents_has_the_conversation(running: Running):
 # Gaze
 
 
-def wait_for(running: Running, kind: str, within_s: float) -> float:
+def wait_for(running, kind, within_s):
     """Return the time until the target is of a kind, inf if it is not in time."""
     start_s = running.ticks[-1].t_s
     for tick in running.go(within_s):
@@ -100,7 +98,7 @@ def wait_for(running: Running, kind: str, within_s: float) -> float:
     return inf
 
 
-def test_a_turn_is_thought_spoken_and_interrupted_with_the_gaze(running: Running):
+def test_a_turn_is_thought_spoken_and_interrupted_with_the_gaze(running):
     running.do(Talk("listening", stay=True), 2.0)
     running.do(Talk("thinking", stay=True))
     assert wait_for(running, "away", 0.3) < 0.05

@@ -4,13 +4,12 @@ import numpy as np
 import pytest
 
 from gazerig.gaze.oculomotor.drift import Drift
-from gazerig.gaze.types import Floats
 
 DT = 0.005
 STEP_DEG = 360.0 / 4096.0
 
 
-def trace(seconds: float, seed: int = 0, dt_s: float = DT, loudness: float | None = None) -> Floats:
+def trace(seconds, seed=0, dt_s=DT, loudness=None):
     """Return yaw, pitch and roll of a drift from rest, (n, 3) degrees."""
     model = Drift("people", np.random.default_rng(seed))
     model.speak(loudness)

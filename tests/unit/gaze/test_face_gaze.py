@@ -15,7 +15,7 @@ TOWARDS = rotation((radians(180.0), 0.0, 0.0))
 
 
 @pytest.mark.parametrize("point", [(0.0, 0.0), (0.03, 0.035), (-0.05, -0.08)])
-def test_a_line_of_sight_meets_the_face_where_it_is_aimed(point: tuple[float, float]):
+def test_a_line_of_sight_meets_the_face_where_it_is_aimed(point):
     y, z = point
     # The owner's left is the viewer's right: the face looks back along -x.
     place = (NOSE[0], NOSE[1] - y, NOSE[2] + z)

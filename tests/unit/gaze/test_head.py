@@ -1,8 +1,8 @@
 """Head goal, timing and trajectory."""
 
-from collections.abc import Callable
 from math import degrees, pi, radians
-from typing import Any, Literal
+from types import SimpleNamespace
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -12,15 +12,13 @@ from hypothesis import strategies as st
 from msgspec.structs import replace
 
 from gazerig.gaze.angles import angle_between, direction
-from gazerig.gaze.minimum_jerk import Quintic
 from gazerig.gaze.oculomotor.head import HeadModel, HeadParams, HeadShare
-from gazerig.gaze.types import Angles2, Floats, Target
 
 NECK = ((-2.0, 2.0), (-1.0, 1.0))
 EQ_7 = HeadParams(goal_model="attention")
 
 
-def head(eye_deg: float = 55.0, params: HeadParams | None = None) -> HeadModel:
+def head(eye_deg=55.0, params=None):
     return HeadModel(
         params or HeadParams(goal_model="attention", min_salience=0.0),
         radians(eye_deg),
@@ -28,9 +26,7 @@ def head(eye_deg: float = 55.0, params: HeadParams | None = None) -> HeadModel:
     )
 
 
-def goal_deg(
-    model: HeadModel, yaw: float, salience: float, pitch: float = 0.0
-) -> tuple[float, float]:
+def goal_deg(model, yaw, salience, pitch=0.0):
     goal = model.goal_rad((radians(yaw), radians(pitch)), model.share.offset_rad(salience))
     return degrees(goal[0]), degrees(goal[1])
 
@@ -55,7 +51,7 @@ def test_two_dimensional_targets_are_shortened_along_the_great_circle():
 
 @pytest.mark.parametrize("short_deg", [5.0, 40.0, 70.0, 120.0])
 @pytest.mark.parametrize("side", [1.0, -1.0])
-def test_a_head_turns_to_the_side_of_a_target_behind_it(short_deg: float, side: float):
+def test_a_head_turns_to_the_side_of_a_target_behind_it(short_deg, side):
     """The shorter arc to it goes through the back, where no neck turns."""
     start = direction((radians(-11.0 * side), 0.0))
     yaw, pitch = head().goal_rad((radians(174.0 * side), 0.1), radians(short_deg), start)
@@ -68,26 +64,8 @@ def test_goal_stays_in_the_neck_range():
     assert model.goal_rad((0.0, 1.2), 0.0)[1] == 0.3
 
 
-def test_from_rest_the_plan_is_eq_8():
-    plan = Quintic((0.1, 0.0, 0.0), 0.7, 0.8)
-    for s in np.linspace(0.0, 1.0, 11):
-        expected = 0.1 + 0.6 * (6 * s**5 - 15 * s**4 + 10 * s**3)
-        assert plan.state_at(0.8 * s)[0] == pytest.approx(expected, abs=1e-12)
-
-
-def test_a_new_goal_in_flight_makes_no_step():
-    first = Quintic((0.0, 0.0, 0.0), 1.0, 0.8)
-    now = first.state_at(0.3)
-    second = Quintic(now, -0.5, 0.6)
-    assert second.state_at(0.0) == pytest.approx(now)
-    assert second.state_at(0.6) == pytest.approx((-0.5, 0.0, 0.0))
-    assert second.state_at(9.0) == (-0.5, 0.0, 0.0)
-
-
 @pytest.mark.parametrize(("aside_deg", "wait_s"), [(10.0, 6.0), (15.0, 1.7), (17.5, 0.92)])
-def test_an_eye_held_aside_is_relieved_slowly_and_the_sooner_the_farther(
-    aside_deg: float, wait_s: float
-):
+def test_an_eye_held_aside_is_relieved_slowly_and_the_sooner_the_farther(aside_deg, wait_s):
     model = HeadModel(HeadParams(), radians(35.0), NECK)
     moved = turn(model, 10.0, lambda t: (target(kind="thing", top_down=True), aside_deg))
     assert np.flatnonzero(moved)[0] * DT == pytest.approx(wait_s, rel=0.06)
@@ -95,7 +73,7 @@ def test_an_eye_held_aside_is_relieved_slowly_and_the_sooner_the_farther(
     assert np.abs(np.diff(moved)).max() / DT <= 20.0 + 1e-6
 
 
-def aimed(params: HeadParams, centre: float, point: float, eye_deg: float = 20.0) -> float:
+def aimed(params, centre, point, eye_deg=20.0):
     """Return where a shift brings the head for a far centre and a point."""
     model = HeadModel(params, radians(eye_deg), NECK)
     return float(turn(model, 1.2, lambda t: (target(), point), centre)[-1])
@@ -112,23 +90,6 @@ def test_alignment_faces_the_target_once_it_is_beyond_the_eyes():
     assert aimed(params, 19.0, 19.0) == 0.0
 
 
-@pytest.mark.parametrize(
-    ("eye_deg", "place", "head_deg"),
-    [
-        (20.0, 30.0, 12.0),
-        (20.0, 40.0, 22.0),
-        (20.0, 60.0, 42.0),
-        (55.0, 40.0, 0.77 * (40.0 - 17.9)),
-    ],
-)
-def test_stahl_share_is_lifted_where_the_eyes_cannot_reach(
-    eye_deg: float, place: float, head_deg: float
-):
-    share = HeadShare(HeadParams(), radians(eye_deg))
-    went = place - degrees(share.undershoot_rad(0.5, radians(place)))
-    assert went == pytest.approx(head_deg, abs=0.1)
-
-
 def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short():
     params = HeadParams(goal_model="attention", min_salience=0.5)
     model = HeadModel(params, radians(20.0), NECK)
@@ -141,13 +102,13 @@ def test_literal_reach_keeps_30_degrees_and_so_the_gaze_short():
 @pytest.mark.parametrize(
     ("size", "peak"), [(20.0, 74.7), (30.0, 96.0), (40.0, 117.3), (60.0, 160.0)]
 )
-def test_larger_head_movements_are_faster(size: float, peak: float):
+def test_larger_head_movements_are_faster(size, peak):
     model = HeadModel(HeadParams(goal_model="align"), radians(5.0), NECK)
     yaws = turn(model, 2.0, lambda t: (target(salience=2.0, top_down=True), size))
     assert np.diff(yaws).max() / DT == pytest.approx(peak, abs=1.5)
 
 
-def turned(params: HeadParams, yaw: float, salience: Callable[[float], float]) -> Floats:
+def turned(params, yaw, salience):
     """Return the head's yaws of 4 s with a face at a yaw whose salience changes; degrees."""
     return turn(head(35.0, params), 4.0, lambda t: (target(salience=salience(t)), yaw))
 
@@ -166,14 +127,6 @@ def test_an_eye_left_aside_by_a_shift_is_relieved_by_people_alone():
     assert paper[-1] == paper[300] and paper[-1] == pytest.approx(20.03, abs=0.1)
 
 
-def test_plans_made_in_full_flight_stay_in_the_neck_range():
-    model = HeadModel(HeadParams(), radians(35.0), ((-0.9, 0.9), (-0.5, 0.5)))
-    places = np.degrees(np.random.default_rng(5).uniform(-1.4, 1.4, 300)).tolist()
-    seen = target(salience=2.0, top_down=True)
-    yaws = turn(model, 60.0, lambda t: (seen, places[round(t / DT) // 40]))
-    assert np.abs(yaws).max() <= np.degrees(0.9)
-
-
 # ---- Travel of the head from any start to any target: never past it.
 
 
@@ -190,13 +143,13 @@ EYES = st.floats(10.0, 60.0)
 
 
 def ends(
-    model: Model,
-    eyes_deg: float,
-    start: Angles2,
-    place: Angles2,
-    salience: float,
-    kind: str = "face",
-) -> tuple[float, float, float]:
+    model,
+    eyes_deg,
+    start,
+    place,
+    salience,
+    kind="face",
+):
     """Let a head at rest turn to a place; angles in degrees.
 
     Returns:
@@ -219,7 +172,7 @@ def ends(
 @settings(max_examples=100)
 @given(MODELS, EYES, PLACES, PLACES, INTERESTS)
 def test_e65_the_head_never_goes_past_the_target_as_seen_from_where_it_comes(
-    model: Model, eyes_deg: float, start: Angles2, place: Angles2, salience: float
+    model, eyes_deg, start, place, salience
 ):
     arc, went, left = ends(model, eyes_deg, start, place, salience)
     assert went <= arc + 1e-6
@@ -228,33 +181,32 @@ def test_e65_the_head_never_goes_past_the_target_as_seen_from_where_it_comes(
 
 @settings(max_examples=100)
 @given(MODELS, EYES, PLACES, PLACES, INTERESTS, INTERESTS)
-def test_e65_less_interest_never_turns_the_head_further(
-    model: Model, eyes_deg: float, start: Angles2, place: Angles2, one: float, other: float
-):
+def test_e65_less_interest_never_turns_the_head_further(model, eyes_deg, start, place, one, other):
     less, more = sorted((one, other))
     moved = [ends(model, eyes_deg, start, place, salience)[1] for salience in (less, more)]
     assert moved[0] <= moved[1] + 1e-6
 
 
-@pytest.mark.parametrize("range_deg", [0.0, 35.8, 60.0])
-def test_e75_stahls_law_holds_for_any_range_of_the_eyes(range_deg: float):
-    share = HeadShare(HeadParams(eye_only_range_deg=range_deg), radians(170.0))
-    for arc_deg in (0.0, 20.0, 70.0):
-        went = radians(arc_deg) - share.undershoot_rad(0.5, radians(arc_deg))
-        law = 0.77 * max(0.0, arc_deg - range_deg / 2.0)
-        assert degrees(went) == pytest.approx(law, abs=1e-9)
+def test_e75_stahls_law_holds_for_any_range_and_is_lifted_where_the_eyes_cannot_reach():
+    for range_deg, eye_deg, place, went in (
+        (0.0, 170.0, 20.0, 0.77 * 20.0), (35.8, 170.0, 17.0, 0.0), (60.0, 170.0, 70.0, 0.77 * 40.0),
+        (35.8, 55.0, 40.0, 0.77 * 22.1), (35.8, 20.0, 30.0, 12.0), (35.8, 20.0, 60.0, 42.0),
+    ):  # fmt: skip
+        share = HeadShare(HeadParams(eye_only_range_deg=range_deg), radians(eye_deg))
+        short = degrees(share.undershoot_rad(0.5, radians(place)))
+        assert place - short == pytest.approx(went, abs=1e-9)
 
 
 @pytest.mark.parametrize("start", [-60.0, -20.0, 0.0, 35.0, 60.0])
 @pytest.mark.parametrize("place", [-60.0, -31.0, 0.0, 16.0, 25.0, 60.0])
-def test_e75_the_model_goes_as_far_as_the_report_expects_of_people(start: float, place: float):
+def test_e75_the_model_goes_as_far_as_the_report_expects_of_people(start, place):
     arc, went, _ = ends("stahl", 75.0, (start, 0.0), (place, 0.0), 0.5, "thing")
     assert went == pytest.approx(
         human_norms.STAHL_SLOPE * max(0.0, arc - human_norms.STAHL_FREE_DEG), abs=1.0
     )
 
 
-def model() -> HeadModel:
+def model():
     return HeadModel(HeadParams(), radians(35.0), TALL_NECK, ROLL)
 
 
@@ -271,7 +223,7 @@ def test_parts_of_a_face_do_not_pull_the_head_further_each_time():
     """The same person all the while: the law counts from where the head was at first."""
     rng = np.random.default_rng(0)
 
-    def part(t: float) -> tuple[Target, float]:
+    def part(t):
         return target(shift=round(t / DT) // 60), 45.0 + 2.0 * float(rng.standard_normal())
 
     yaws = turn(HeadModel(HeadParams(), radians(50.0), TALL_NECK, ROLL), 2.9, part, facing_deg=45.0)
@@ -280,9 +232,7 @@ def test_parts_of_a_face_do_not_pull_the_head_further_each_time():
 
 @settings(max_examples=100)
 @given(st.floats(-80.0, 80.0), INTERESTS, INTERESTS)
-def test_e75_the_roll_goes_to_the_side_of_the_target_and_grows_with_interest(
-    yaw_deg: float, one: float, other: float
-):
+def test_e75_the_roll_goes_to_the_side_of_the_target_and_grows_with_interest(yaw_deg, one, other):
     share = HeadShare(HeadParams(), radians(35.0))
     less, more = (abs(share.roll_rad(s, radians(yaw_deg))) for s in sorted((one, other)))
     assert less <= more + 1e-12 and degrees(more) <= 4.0
@@ -292,7 +242,7 @@ def test_e75_the_roll_goes_to_the_side_of_the_target_and_grows_with_interest(
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_e75_a_roll_does_not_swing_when_the_head_is_called_elsewhere(seed: int):
+def test_e75_a_roll_does_not_swing_when_the_head_is_called_elsewhere(seed):
     rng, angles = np.random.default_rng(seed), (0.0, 0.0, 0.0)
     facing, name = (0.0, 0.0), 0
     head, rolls = model(), []
@@ -306,13 +256,11 @@ def test_e75_a_roll_does_not_swing_when_the_head_is_called_elsewhere(seed: int):
 
 
 def test_e75_a_neck_without_a_roll_joint_does_not_roll():
-    facing, seen, rolls = (radians(60.0), 0.0), target(salience=1.0), []
-    for limits in ((0.0, 0.0), ROLL):
+    facing, seen = (radians(60.0), 0.0), target(salience=1.0)
+    for limits, rolls in (((0.0, 0.0), 0.0), (ROLL, -4.0)):
         head = HeadModel(HeadParams(), radians(35.0), TALL_NECK, limits)
-        for t in (0.0, 0.5, 2.9):
-            roll = head.step(seen, facing, facing, radians(60.0), 1.0, t)[2]
-        rolls.append(degrees(roll))
-    assert rolls[0] == 0.0 and rolls[1] == pytest.approx(-4.0, abs=0.1)
+        found = [head.step(seen, facing, facing, 1.0, 1.0, t)[2] for t in (0.0, 0.5, 2.9)]
+        assert degrees(found[-1]) == pytest.approx(rolls, abs=0.1)
 
 
 # ---- The head between shifts and from shift to shift: pursuit, recentring, scatter, search.
@@ -322,16 +270,16 @@ SMALL_NECK = ((-1.3, 1.3), (-0.6, 0.6))
 SMALL_ROLL = (-0.4, 0.4)
 
 
-def small_head(seed: int | None = 0, **params: Any) -> HeadModel:
-    rng = None if seed is None else np.random.default_rng(seed)
+def small_head(seed=0, **params):
+    rng = np.random.default_rng(seed) if isinstance(seed, int) else seed
     return HeadModel(HeadParams(**params), radians(35.0), SMALL_NECK, SMALL_ROLL, rng)
 
 
-def seen(id: int = 1, kind: str = "face") -> Target:
+def seen(id=1, kind="face"):
     return target(kind=kind, id=id, top_down=True, shift=id)
 
 
-def follow(head: HeadModel, place: Floats, kind: str = "face") -> Floats:
+def follow(head, place, kind="face"):
     """Return the yaws of a head with a target at these yaws, one a tick; degrees."""
     yaws = [0.0]
     for k, yaw in enumerate(place.tolist()):
@@ -406,8 +354,8 @@ def test_recentring_is_random_and_slow():
 
 
 @pytest.mark.parametrize(("elsewhere", "id"), [("hand", 1_000_001), ("face", 2)])
-def test_glances_do_not_end_the_strain_of_the_eyes(elsewhere: str, id: int):
-    def place(t: float) -> tuple[Target, float]:
+def test_glances_do_not_end_the_strain_of_the_eyes(elsewhere, id):
+    def place(t):
         return (seen(id, elsewhere), 6.0) if t % 1.0 > 0.8 else (seen(1, "thing"), 15.0)
 
     still, glancing = (
@@ -418,8 +366,8 @@ def test_glances_do_not_end_the_strain_of_the_eyes(elsewhere: str, id: int):
 
 
 @pytest.mark.parametrize(("far", "turned"), [(17.0, 4.8), (25.0, 12.0)])
-def test_the_head_takes_a_share_in_looks_away_and_returns_from_them(far: float, turned: float):
-    def place(t: float) -> tuple[Target, float]:
+def test_the_head_takes_a_share_in_looks_away_and_returns_from_them(far, turned):
+    def place(t):
         return (seen(1, "away"), far) if 1.0 < t % 3.0 < 2.5 else (seen(), 5.0)
 
     head, yaws = small_head(), [0.0]
@@ -444,13 +392,13 @@ def test_the_head_does_not_run_away_while_averted_eyes_change_the_person():
 
 
 @pytest.mark.parametrize("kind", ["face", "thing"])
-def test_the_head_comes_at_once_to_who_is_urgent(kind: str):
+def test_the_head_comes_at_once_to_who_is_urgent(kind):
     on = replace(seen(kind=kind), urgent=True)
     assert turn(small_head(), 1.0, lambda t: (on, 40.0))[-1] == pytest.approx(40.0, abs=8.0)
     assert turn(small_head(), 0.8, lambda t: (on, 15.0))[-1] == pytest.approx(15.0, abs=6.0)
 
 
-def shifts(seed: int | None) -> Floats:
+def shifts(seed):
     """Return how far the head turned for 40 deg, 40 times; degrees."""
     head, turned = small_head(seed), []
     for n in range(40):
@@ -471,13 +419,15 @@ def test_equal_shifts_scatter_within_bounds():
     assert np.ptp(shifts(None)) < 1e-9, "without a generator all are equal"
 
 
-def test_the_head_is_first_in_half_of_its_own_looks_and_never_in_a_reaction():
-    head = small_head(5)
-    own = [head.draw_lead_s(seen(-2 - n, "glance"), 0.7) for n in range(600)]
-    assert 0.5 < np.mean(np.array(own) > 0.0) < 0.75
-    assert 0.35 < np.mean(np.array(own) > 0.008) < 0.6 and max(own) <= 0.071
-    assert max(head.draw_lead_s(seen(n), 0.7) for n in range(200)) == 0.0
-    assert max(head.draw_lead_s(seen(-2, "glance"), 0.1) for n in range(50)) == 0.0
+def test_the_head_is_first_in_its_own_looks_and_never_in_a_reaction():
+    """By 6.5 ms with a deviation of 30 ms, two deviations at most."""
+    for kind, aside, normal, lead_s in (
+        ("glance", 0.7, 0.0, 0.0065), ("glance", 0.7, 1.0, 0.0365), ("glance", 0.7, 9.0, 0.0665),
+        ("glance", 0.7, -1.0, 0.0), ("glance", 0.1, 1.0, 0.0), ("face", 0.7, 1.0, 0.0),
+    ):  # fmt: skip
+        drawn = SimpleNamespace(standard_normal=lambda n=normal: n, uniform=min)
+        head = small_head(drawn)
+        assert head.draw_lead_s(seen(-2, kind), aside) == pytest.approx(lead_s)
 
 
 def test_a_search_is_completed_by_the_head():
@@ -487,7 +437,7 @@ def test_a_search_is_completed_by_the_head():
 
 
 @pytest.mark.parametrize("law", ["attention", "align"])
-def test_the_papers_heads_are_not_random(law: str):
+def test_the_papers_heads_are_not_random(law):
     place = np.full(200, 50.0)
     one, other = (follow(small_head(seed, goal_model=law), place) for seed in (1, None))
     assert (one == other).all()

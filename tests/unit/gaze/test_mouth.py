@@ -10,7 +10,7 @@ from gazerig.gaze.types import Floats
 RATE = 16000
 
 
-def tone(hz: float, seconds: float, size: float = 0.5) -> Floats:
+def tone(hz, seconds, size=0.5):
     samples: Floats = size * np.sin(2 * np.pi * hz * np.arange(round(seconds * RATE)) / RATE)
     return samples
 
@@ -23,7 +23,7 @@ def test_the_pressure_is_the_root_mean_square_in_the_band_of_an_open_mouth():
     assert len(Mouth(RATE).band_pressures(tone(1000, 0.01))) == 0
 
 
-def mouth_of(samples: Floats, pieces: int = 1, rate: int = RATE) -> Mouth:
+def mouth_of(samples, pieces=1, rate=RATE):
     mouth = Mouth(rate)
     for piece in np.array_split(samples, pieces):
         mouth.add(piece)
@@ -50,18 +50,18 @@ def test_ten_decibels_less_are_half_as_loud():
 
 
 @pytest.mark.parametrize("samples", [np.zeros(RATE), np.zeros(0), np.full(RATE, 1.0)])
-def test_silence_nothing_and_a_constant_keep_the_mouth_shut(samples: Floats):
+def test_silence_nothing_and_a_constant_keep_the_mouth_shut(samples):
     assert all(value == 0.0 for _, value in mouth_of(samples).keys(1.0))
 
 
-def spoken(period_s: float, seconds: float = 3.0) -> Floats:
+def spoken(period_s, seconds=3.0):
     """Return syllables without pauses, which are never silent."""
     t_s = np.arange(round(seconds * RATE)) / RATE
     loud = 0.6 - 0.4 * np.cos(2 * np.pi * t_s / period_s)
     return np.asarray(tone(1000, seconds) * loud, dtype=np.float64)
 
 
-def followed(mouth: Mouth, seconds: float) -> tuple[Floats, Floats]:
+def followed(mouth, seconds):
     """Return times, and the opening of a level that follows the keys of a mouth, as it is led."""
     level = MinimumJerkBlend((0.0,), 0.08)
     keys = np.array(mouth.keys(seconds, 0.04)).T

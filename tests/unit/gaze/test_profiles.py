@@ -2,7 +2,6 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator
 from cProfile import Profile
 from functools import cache
 from math import atan2, degrees, pi, radians
@@ -13,7 +12,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 import pytest
 from fakes.scenes import EmptyScene
-from human.measured_run import MeasuredRun, half_rate_run, measured_run
+from human.measured_run import half_rate_run, measured_run
 from human.row_03_rests import visits
 
 from gazerig.config.parameters import apply_changes
@@ -40,7 +39,7 @@ class EverythingOnce(EmptyScene):
     name = "everything-once"
     round_s = SECONDS
 
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+    def people(self, t_s):
         """Return the person, who goes at 10 s."""
         if t_s > 10.0:
             return ()
@@ -50,7 +49,7 @@ class EverythingOnce(EmptyScene):
         hand = (face[0] - 0.12, face[1] - 0.3 + swing, face[2]) if 7.0 < t_s < 9.0 else None
         return (ScenePerson(face, (pi + atan2(face[1], face[0]), 0.0), hand),)
 
-    def things(self, t_s: float) -> tuple[Thing, ...]:
+    def things(self, t_s):
         """Return a hand that comes in when the person has gone."""
         if not 10.5 < t_s < 11.5:
             return ()
@@ -66,13 +65,13 @@ class Claim(NamedTuple):
     cells: tuple[str, ...]
 
 
-def rows() -> list[str]:
+def rows():
     """Return the lines of the page's section about profiles."""
     text = PAGE.read_text(encoding="utf-8")
     return text.partition("\n## Profiles\n")[2].partition("\n## ")[0].splitlines()
 
 
-def claims() -> Iterator[Claim]:
+def claims():
     """Yield the rows of the page's tables."""
     for line in rows():
         if found := _ROW.match(line):
@@ -88,7 +87,7 @@ class Trace(NamedTuple):
 
 
 @cache
-def ran(profile: str, scanpath: str | None = None, seconds: float = SECONDS) -> Trace:
+def ran(profile, scanpath=None, seconds=SECONDS):
     """Return what runs in a profile, and what it looks at."""
     calls, kinds = Profile(subcalls=False, builtins=False), set[str]()
     scene = EverythingOnce()
@@ -116,7 +115,7 @@ CLAIMS = list(claims())
 
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim.name)
-def test_e68_what_the_page_says_runs_where_it_says(claim: Claim):
+def test_e68_what_the_page_says_runs_where_it_says(claim):
     for profile, cell in zip(PROFILES, claim.cells, strict=True):
         assert cell == ("runs" if ran(profile).calls[claim.name] else "-"), profile
 
@@ -133,7 +132,7 @@ def test_every_row_of_the_page_is_read():
     [("simple", "SimpleCycle.step"), ("face_tracking", "FaceTracking.step"),
      ("random", "RandomAngles.step")],
 )  # fmt: skip
-def test_e68_the_baselines_of_the_paper_run_in_its_profile(scanpath: str, function: str):
+def test_e68_the_baselines_of_the_paper_run_in_its_profile(scanpath, function):
     calls = ran("nakamoto", scanpath, 6.0).calls
     assert calls[function] > 200 and calls["MarkovWalk.step"] == 0
     assert calls["OppositeAngles.fixate"] > 200
@@ -146,11 +145,11 @@ def test_e68_each_profile_looks_at_what_its_paper_has():
 
 
 @pytest.fixture(scope="module")
-def nakamoto() -> MeasuredRun:
+def nakamoto():
     return half_rate_run("face-to-face", "nakamoto", seconds=25.0)
 
 
-def test_e68_nakamoto_walks_as_its_table_with_no_look_away(nakamoto: MeasuredRun):
+def test_e68_nakamoto_walks_as_its_table_with_no_look_away(nakamoto):
     found = visits(nakamoto)
     assert 1.0 / np.mean([visit.seconds for visit in found]) == pytest.approx(3.69, rel=0.12)
     assert min(visit.rest_s for visit in found) < 0.06  # no floor
@@ -159,7 +158,7 @@ def test_e68_nakamoto_walks_as_its_table_with_no_look_away(nakamoto: MeasuredRun
     assert np.abs(nakamoto.eyes_goal_deg).max() <= 20.0 + 1e-6
 
 
-def test_e68_nakamoto_turns_the_head_beyond_20_deg_only(nakamoto: MeasuredRun):
+def test_e68_nakamoto_turns_the_head_beyond_20_deg_only(nakamoto):
     moves = np.abs(np.diff(nakamoto.head_goal_deg[:, 0])) > 0.02
     begins = np.flatnonzero(moves[1:] & ~moves[:-1]) + 1
     begins = begins[np.diff(begins, prepend=-400) > 300]  # a movement may be planned again
@@ -179,12 +178,12 @@ class Aside(EmptyScene):
 
     name = "aside"
 
-    def people(self, t_s: float) -> tuple[ScenePerson, ...]:
+    def people(self, t_s):
         return (ScenePerson((0.866, 0.5, 0.125), (radians(-150.0), 0.0), None),)
 
 
 @pytest.mark.parametrize(("salience", "short"), [(0.4, 29.121), (0.6, 15.0), (0.8, 0.879)])
-def test_e12_offset_values_of_the_running_head(salience: float, short: float):
+def test_e12_offset_values_of_the_running_head(salience, short):
     rules = {
         "gaze.top_down.rules.wait.salience": salience, "loop.rate_hz": 50.0
     }  # fmt: skip

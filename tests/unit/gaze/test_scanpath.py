@@ -1,6 +1,5 @@
 """The Markov walk over face parts (Nakamoto & Tsuruno)."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from math import inf
@@ -28,7 +27,7 @@ PRINTED = ScanpathParams(law="literal")
 """The walk as the paper has it."""
 
 
-def walker(seed: int = 1, params: ScanpathParams = PRINTED) -> Scanpath:
+def walker(seed=1, params=PRINTED):
     return Scanpath(params, WALK, np.random.default_rng(seed))
 
 
@@ -104,9 +103,7 @@ def test_rests_begin_at_the_shortest_one_and_keep_the_means_above():
     ("gaze_m", "end"),
     [((1.0, -0.5, 0.2), min), ((1.0, 0.9, 0.2), max)],
 )
-def test_a_face_is_entered_at_the_eye_or_the_nose_nearest_to_the_gaze(
-    gaze_m: tuple[float, float, float], end: Callable[..., str]
-):
+def test_a_face_is_entered_at_the_eye_or_the_nose_nearest_to_the_gaze(gaze_m, end):
     # The parts of FACE are in a row, the first in the middle, the last farthest to the left.
     walk = walker(6, ScanpathParams())
     wanted, farthest = end(ENTRY_PARTS, key=PARTS.index), max(ENTRY_PARTS, key=PARTS.index)
@@ -140,7 +137,7 @@ def test_the_first_rest_on_a_face_begins_when_the_gaze_arrives():
 
 
 @cache
-def walked(count: int, seed: int = 1) -> list[PartFixation]:
+def walked(count, seed=1):
     """Fixations of the known walk with gamma laws, 20 ms of flight between them."""
     rng = np.random.default_rng(seed)
     walk = markov_walk(PRINTED, WALK, rng)
@@ -154,12 +151,12 @@ def walked(count: int, seed: int = 1) -> list[PartFixation]:
     return out
 
 
-def dice() -> np.random.Generator:
+def dice():
     return np.random.default_rng(4)
 
 
 @pytest.mark.parametrize("smoothing", ["none", "laplace"])
-def test_a_known_walk_is_recovered(smoothing: str):
+def test_a_known_walk_is_recovered(smoothing):
     fitted = fit_walk(walked(20_000), smoothing, dice())
     wanted = normalise(WALK.matrix)
     for row, counts, truth in zip(fitted.matrix, fitted.counts, wanted, strict=True):
@@ -204,7 +201,7 @@ def test_counts_are_of_neighbours_on_the_face_only():
 def test_what_cannot_be_trusted_is_refused():
     looks = walked(100)
 
-    def refused(changed: list[PartFixation], why: str, smoothing: str = "laplace") -> None:
+    def refused(changed, why, smoothing="laplace"):
         with pytest.raises(ValueError, match=why):
             fit_walk(changed, smoothing, dice())
 
@@ -226,7 +223,7 @@ def test_what_cannot_be_trusted_is_refused():
 PEOPLE = load(shipped_path("scanpaths", "people"), Walk)
 
 
-def visited(face: Face) -> dict[str, float]:
+def visited(face):
     """Return the share of the looks at each part of a face 1 m or more ahead."""
     walk = Scanpath(ScanpathParams(), PEOPLE, np.random.default_rng(1))
     percept, parts = Percept(0.0, Bodies(), (face,)), []
@@ -240,7 +237,7 @@ def visited(face: Face) -> dict[str, float]:
     return {part: parts.count(part) / len(parts) for part in PARTS}
 
 
-def face_at(away_m: float, speaks: bool = False) -> Face:
+def face_at(away_m, speaks=False):
     R = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
     centre = (away_m, 0.0, 0.2)
     parts = tuple(

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from math import degrees
-from typing import Any
 
 import numpy as np
 import pytest
@@ -19,20 +18,20 @@ from gazerig.gaze.scanpath.scanpath import (
     normalise,
     row_sums_note,
 )
-from gazerig.gaze.types import PARTS, Face, Percept, Target, Vec3
+from gazerig.gaze.types import PARTS, Face, Percept, Target
 
 WALK = load(shipped_path("scanpaths", "nakamoto_tsuruno"), Walk)
-HEAD: Vec3 = (0.02, -0.01, 0.25)
+HEAD = (0.02, -0.01, 0.25)
 FACING = ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0))
 
 
-def face_at(p: Vec3, v: Vec3 = (0.0, 0.0, 0.0), number: int = 3) -> Face:
+def face_at(p, v=(0.0, 0.0, 0.0), number=3):
     parts = tuple(add(p, (0.0, 0.01 * i, 0.0)) for i in range(8))
     nose = PARTS.index("N")
     return Face(number, p, v, FACING, (*parts[:nose], p, *parts[nose + 1 :]), 0.9)
 
 
-def target_of(face: Face, at_s: float = 0.0) -> Target:
+def target_of(face, at_s=0.0):
     at = face.p_world_m, face.v_world_m_s, at_s
     return Target(*at, "face", face.id, 0.5, True, None, 1, "face 3")
 
@@ -42,13 +41,13 @@ PERCEPT = Percept(0.0, faces=(FACE,))
 TARGET = target_of(FACE)
 
 
-def looks_of(params: ScanpathParams, seconds: float, dt: float, seed: int = 1) -> list[Target]:
+def looks_of(params, seconds, dt, seed=1):
     path = Scanpath(params, WALK, np.random.default_rng(seed))
     steps = range(round(seconds / dt))
     return [path.wander(TARGET, PERCEPT, k * dt, True, HEAD) for k in steps]
 
 
-def visits(looks: list[Target], dt: float) -> list[tuple[str | None, float]]:
+def visits(looks, dt):
     """Parts with their times, the last and unfinished one left out."""
     ends = [k for k in range(1, len(looks)) if looks[k].shift != looks[k - 1].shift]
     starts = [0, *ends]
@@ -110,7 +109,7 @@ def test_e43_face_tracking_stays_at_the_centre_of_a_moving_face():
 
 
 @pytest.mark.parametrize("model", ["markov", "simple", "face_tracking", "random"])
-def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(model: Any):
+def test_every_model_passes_other_targets_on_and_gives_the_head_the_centre(model):
     path = Scanpath(ScanpathParams(model=model), WALK, np.random.default_rng(1))
     hand = structs.replace(TARGET, kind="hand", id=9, why="hand 9")
     assert path.wander(hand, PERCEPT, 0.0, True, HEAD) == hand

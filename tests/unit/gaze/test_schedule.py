@@ -33,7 +33,7 @@ def test_people_who_arrive_and_leave_start_tracks_and_posters_none():
     assert found == [(5, "hello"), (12, "bye")]
 
 
-def test_a_rig_starts_its_tracks_and_says_what_is_wrong(tmp_path: Path):
+def test_a_rig_starts_its_tracks_and_says_what_is_wrong(tmp_path):
     rig = tmp_path / "show.yaml"
     text = Path("config/rigs/minimal.yaml").read_text("utf-8")
     rig.write_text(

@@ -8,14 +8,14 @@ from gazerig.gaze.oculomotor.pursuit import Slip
 from gazerig.gaze.oculomotor.saccade_trigger import SaccadeTrigger
 
 
-def slip(error_deg: float, slip_deg_s: float = 0.0) -> Slip:
+def slip(error_deg, slip_deg_s=0.0):
     return Slip((0.0, radians(error_deg), 0.0), (0.0, radians(slip_deg_s), 0.0))
 
 
 REFRACTORY_S = 0.15
 
 
-def settled() -> SaccadeTrigger:
+def settled():
     """Return a rule that has answered its first event and landed exactly at 0."""
     rule = SaccadeTrigger(True)
     rule.record_shift(1, 0.0, None, -1.0)
@@ -26,7 +26,7 @@ def settled() -> SaccadeTrigger:
     return rule
 
 
-def first_s(rule: SaccadeTrigger, seen: Slip) -> float | None:
+def first_s(rule, seen):
     times = (k / 1000 for k in range(1, 1000))
     return next((t for t in times if rule.is_due(seen, t, REFRACTORY_S)), None)
 
@@ -41,7 +41,7 @@ def test_error_beyond_two_degrees_jumps_after_the_refractory_time():
 @pytest.mark.parametrize(
     ("crossing_ms", "jumps"), [(30.0, True), (50.0, False), (170.0, False), (200.0, True)]
 )
-def test_an_eye_about_to_cross_the_target_needs_no_saccade(crossing_ms: float, jumps: bool):
+def test_an_eye_about_to_cross_the_target_needs_no_saccade(crossing_ms, jumps):
     seen = slip(3.0, -3.0 / (crossing_ms / 1e3))
     assert (first_s(settled(), seen) is not None) == jumps
 

@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from functools import cache
 from math import degrees, pi, radians
-from pathlib import Path
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -17,15 +16,15 @@ from gazerig.config.tracks import TrackFiles, load_track
 from gazerig.gaze.attention.top_down import Rule
 from gazerig.gaze.lids.lids import LidOpenings
 from gazerig.gaze.track.animation import Animation
-from gazerig.gaze.track.motion import Curves, Motion, key_states
-from gazerig.gaze.track.player import Playback, TrackPlayer
-from gazerig.gaze.track.track import EYES, HEAD, LIDS, LIMIT_SHARE, KeyFrame, PoseOffset, Track
+from gazerig.gaze.track.motion import Curves, key_states
+from gazerig.gaze.track.player import TrackPlayer
+from gazerig.gaze.track.track import EYES, HEAD, LIDS, LIMIT_SHARE, KeyFrame, Track
 from gazerig.gaze.track.track_trigger import TrackTrigger
-from gazerig.gaze.types import Angles2, Floats, GazeCommand, Target
-from gazerig.robot.loop.tracks import TrackChoices, TrackFit
+from gazerig.gaze.types import Angles2, GazeCommand, Target
+from gazerig.robot.loop.tracks import TrackChoices
 from gazerig.robot.model.commands import EndTrack, Play
 from gazerig.robot.model.joint import JointLimit
-from gazerig.robot.model.types import JointAngles, further_joints
+from gazerig.robot.model.types import further_joints
 from gazerig.robot.run.models import rig_kinematics
 from gazerig.robot.run.rig_limits import limits, offsets, track_fit
 from gazerig.robot.run.track_file import fit_keys
@@ -38,30 +37,30 @@ rig_named = cache(load_rig)
 
 
 @cache
-def fit_to(name: str) -> TrackFit:
+def fit_to(name):
     """Return the fit to a shipped rig, which computes each motion once."""
     fit = track_fit(rig_named(name))
     fit.motion = cache(fit.motion)  # type: ignore[method-assign]
     return fit
 
 
-def fitted(track: Track, name: str = "desk") -> Motion:
+def fitted(track, name="desk"):
     """Return the curves of a track on a shipped rig."""
     return fit_to(name).motion(track, tuple(limits(rig_named(name).joints)), Play("it"))
 
 
-def sampled(motion: Motion) -> Floats:
+def sampled(motion):
     return motion.curves.sample(np.arange(0.0, motion.duration_s + 0.1, 0.001))
 
 
 @cache
-def shipped_tracks() -> dict[str, Track]:
+def shipped_tracks():
     return cast(dict[str, Track], TrackFiles("desk", ()).read())
 
 
 @pytest.mark.parametrize("name", shipped_names("tracks"))
 @pytest.mark.parametrize("rig", RIGS)
-def test_every_shipped_track_is_done_by_every_shipped_rig_as_written(name: str, rig: str):
+def test_every_shipped_track_is_done_by_every_shipped_rig_as_written(name, rig):
     track = shipped_tracks()[name]
     needed = {"brow_shrug": "left_brow", "tilt": "neck_roll"}.get(name)
     if needed and needed not in rig_named(rig).names:
@@ -76,14 +75,14 @@ def test_every_shipped_track_is_done_by_every_shipped_rig_as_written(name: str, 
     assert np.abs(samples[:, [0, -1]]).max() < 1e-9
 
 
-def curve(times: Floats, values: Floats, at: Floats) -> Floats:
+def curve(times, values, at):
     """Return the (3, n) states of the curve through keys at times."""
     return Curves(times, key_states(times, values)[:, :, None]).sample(at)[:, :, 0]
 
 
 @given(keys=st.lists(st.tuples(st.floats(0.05, 2.0), st.floats(0.1, 30.0)), min_size=1, max_size=8))
 @settings(max_examples=100, deadline=None)
-def test_a_curve_that_does_not_turn_never_swings_back(keys: list[tuple[float, float]]):
+def test_a_curve_that_does_not_turn_never_swings_back(keys):
     spans, steps = np.array(keys).T
     times, values = np.append(0.0, np.cumsum(spans)), np.append(0.0, np.cumsum(steps))
     value, speed, _ = curve(times, values, np.linspace(0.0, times[-1], 500))
@@ -106,7 +105,7 @@ def test_dense_keys_of_a_steady_turn_move_at_a_steady_speed():
     assert speed == pytest.approx(np.full(500, 30.0))
 
 
-def nod() -> Track:
+def nod():
     return Track("a nod", (KeyFrame(0.2, head_pitch_deg=-8.0), KeyFrame(0.5, head_pitch_deg=0.0)))
 
 
@@ -203,7 +202,7 @@ BAD = {
 }
 
 
-def test_a_long_track_is_one_curve_and_a_longer_file_is_refused(tmp_path: Path):
+def test_a_long_track_is_one_curve_and_a_longer_file_is_refused(tmp_path):
     file = tmp_path / "long.yaml"
     file.write_text(f"description: long\n{LONG}cues: {{a: 4}}\n", encoding="utf-8")
     track = load_track(file)
@@ -218,7 +217,7 @@ def test_a_long_track_is_one_curve_and_a_longer_file_is_refused(tmp_path: Path):
 
 
 @pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
-def test_a_bad_file_is_answered_with_line_key_and_rule(text: str, tmp_path: Path):
+def test_a_bad_file_is_answered_with_line_key_and_rule(text, tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text(f"description: mine\n{text}", encoding="utf-8")
     with pytest.raises(ConfigError) as caught:
@@ -251,11 +250,11 @@ SPEEDS = (0.5, 0.65, 0.85, 1.1, 1.45, 2.0)
 """Few, so that each motion is computed once."""
 
 
-def joint_angles(rig_name: str, changes: list[PoseOffset]) -> Floats:
+def joint_angles(rig_name, changes):
     """Return (n, joints) angles of a head that looks at a point straight ahead all the while."""
     kinematics = rig_kinematics(rig_named(rig_name))
 
-    def angles(one: PoseOffset) -> JointAngles:
+    def angles(one):
         yaw, pitch, roll = one.change(HEAD, (0.0, 0.0, 0.0))
         eyes = kinematics.eye_angles_to(TARGET, *kinematics.head_pose((yaw, pitch, roll)))
         left, right = (cast(Angles2, tuple(one.change(EYES, eye))) for eye in eyes)
@@ -269,7 +268,7 @@ def joint_angles(rig_name: str, changes: list[PoseOffset]) -> Floats:
     return np.array([angles(one) for one in changes])
 
 
-def interrupted(track: str, rig_name: str, moments: int) -> tuple[Floats, Sequence[JointLimit]]:
+def interrupted(track, rig_name, moments):
     """Play a track and, at random moments, another one, the same again, or nothing.
 
     Returns:
@@ -302,7 +301,7 @@ RIG_OF = dict(
 
 
 @pytest.mark.parametrize("track", TRACKS)
-def test_no_joint_jumps_or_breaks_a_limit_at_random_moments(track: str):
+def test_no_joint_jumps_or_breaks_a_limit_at_random_moments(track):
     angles, bounds = interrupted(track, RIG_OF[track], 80)
     speed = np.abs(np.diff(angles, axis=0)).max(axis=0) / DT_S
     acceleration = np.abs(np.diff(angles, 2, axis=0)).max(axis=0) / DT_S**2
@@ -321,35 +320,35 @@ class Show(NamedTuple):
     choices: TrackChoices
     bounds: Sequence[JointLimit]
 
-    def play(self, name: str, t_s: float, **how: object) -> int:
-        reply = self.choices.play(Play(name, **how), t_s)  # type: ignore[arg-type]
+    def play(self, name, t_s, **how):
+        reply = self.choices.play(Play(name, **how), t_s)
         assert reply.track is not None, reply
         return reply.track.number
 
-    def added(self, t_s: float) -> Floats:
+    def added(self, t_s):
         return self.player.step(t_s)[1]
 
 
-def playback(it: Show) -> Playback:
+def playback(it):
     """Return the only track that plays."""
     (found,) = it.player.playing
     return found
 
 
-def strain(motion: Motion, offsets: Floats, dt_s: float) -> float:
+def strain(motion, offsets, dt_s):
     """Return the factor by which offsets must be slower to keep the share of all limits."""
     speed = np.diff(offsets, axis=0) / dt_s
     return float(motion.strain(np.stack((speed[1:], np.diff(speed, axis=0) / dt_s))).max())
 
 
-def show(**tracks: Track) -> Show:
+def show(**tracks):
     joints = rig_named("expressive").joints
     player, bounds = TrackPlayer(len(further_joints(joints))), limits(joints)
     choices = TrackChoices(lambda: tracks, player, fit_to("expressive"), lambda: bounds)
     return Show(player, choices, bounds)
 
 
-def long_track(seconds: float, seed: int) -> Track:
+def long_track(seconds, seed):
     """Return a track with a key of neck and jaw in each second or so."""
     random, times = np.random.default_rng(seed), np.arange(0.8, seconds, 0.9)
     frames = tuple(
@@ -381,7 +380,7 @@ def test_a_show_of_an_hour_with_many_corrections_keeps_all_limits():
 
 
 @pytest.mark.parametrize("at_s", [3.1, 40.0, 59.0])
-def test_a_track_that_begins_in_its_middle_grows_from_rest_within_limits(at_s: float):
+def test_a_track_that_begins_in_its_middle_grows_from_rest_within_limits(at_s):
     it = show(minute=long_track(60.0, 3))
     it.play("minute", 0.0, from_s=at_s)
     started = playback(it)
@@ -463,7 +462,7 @@ def test_loops_cues_and_a_clock_of_a_sound():
     assert 1.0 <= playing.position_s <= 1.5
 
 
-def looked_at(kind: str, number: int = 1) -> Target:
+def looked_at(kind, number=1):
     return Target((1.0, 0.0, 0.2), (0.0, 0.0, 0.0), 0.0, kind, number, 0.5, True, None, 0, "")
 
 
