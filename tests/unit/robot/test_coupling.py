@@ -11,8 +11,6 @@ import pytest
 from command_line import invoked
 from expressive_rig import faults
 from fakes.runs import ticks
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from gazerig.config.load import shipped_path
 from gazerig.config.rig import Rig
@@ -33,37 +31,6 @@ def rig_with(coupling: CouplingParams) -> Rig:
     # With a balanced head goals have no part that makes up for its weight.
     balanced = MassParams(head=HeadMassParams(com_mm=(0.0, 0.0, 0.0)))
     return replace(load_rig("desk"), couplings={"neck": coupling}, mass=balanced)
-
-
-@settings(max_examples=100)
-@given(first=st.floats(-PITCH, PITCH), second=st.floats(-ROLL, ROLL))
-def test_servo_angles_come_back_as_joint_angles_to_1e_9(first: float, second: float):
-    at = radians(first), radians(second)
-    assert COUPLING.joint_rad(COUPLING.servo_rad(at)) == pytest.approx(at, abs=1e-9)
-
-
-def test_a_differential_is_the_mean_and_half_the_difference():
-    assert CouplingParams("a", "b").joint_rad((0.5, 0.1)) == pytest.approx((0.3, 0.2))
-    for column, joint in enumerate(((1.0, 0.0), (0.0, 1.0))):
-        slopes = [row[column] for row in COUPLING.rates]
-        assert COUPLING.servo_rad(joint) == pytest.approx(slopes)
-
-
-def test_servos_get_the_limits_that_the_whole_range_needs():
-    rig = rig_with(COUPLING)
-    assert faults(rig) == []
-    found = dict(zip(rig.names, servo_configs(rig), strict=True))
-    plain = dict(zip(rig.names, servo_configs(load_rig("desk")), strict=True))
-    assert {name for name in rig.names if found[name] != plain[name]} == {"neck_pitch", "neck_roll"}
-    needed: dict[str, list[float]] = {"neck_pitch": [], "neck_roll": []}
-    for first in (-PITCH, 0.0, PITCH):
-        for second in (-ROLL, 0.0, ROLL):
-            servos = COUPLING.servo_rad((radians(first), radians(second)))
-            for name, angle in zip(needed, servos, strict=True):
-                needed[name].append(rig.joints[name].steps(angle))
-    for name, steps in needed.items():
-        assert found[name].min_steps == pytest.approx(min(steps), abs=2.0)
-        assert found[name].max_steps == pytest.approx(max(steps), abs=2.0)
 
 
 @pytest.mark.parametrize(

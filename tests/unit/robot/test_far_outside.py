@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import replace
-from math import degrees, nan, radians
+from math import degrees, radians
 
 import pytest
 from command_line import typed
@@ -12,8 +12,6 @@ import gazerig
 from gazerig.config.rig import Rig
 from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import ServoMissing, SetupError
-from gazerig.robot.model.coupling import CouplingParams, far_outside, find_far_outside
-from gazerig.robot.model.joint import JointLimit
 from gazerig.robot.run import emulated
 
 EYE = "left_eye_pan"
@@ -194,33 +192,3 @@ def test_a_head_of_a_program_has_the_same_rule():
     for head in (gazerig.open("desk", fast=True), gazerig.open("desk", mock=True, bus="ideal")):
         with pytest.raises(SetupError, match=SAID), head:
             pass
-
-
-def test_the_text_of_one_joint():
-    limit = JointLimit(radians(-45.0), radians(45.0), 1.0, 1.0)
-    for inside in (-55.0, 0.0, 54.9):
-        assert far_outside(radians(inside), limit) == ""
-    assert "is at 186 deg, 141 deg outside its range -45..45 deg" in far_outside(
-        radians(186.0), limit
-    )
-    assert "is at -56 deg, 11 deg outside" in far_outside(radians(-56.0), limit)
-    assert far_outside(nan, limit)
-
-
-DIFFERENTIAL = CouplingParams("neck_pitch", "neck_roll")
-
-
-@pytest.mark.parametrize(
-    ("pitch_deg", "roll_deg", "far"),
-    [(0.0, 0.0, ()), (30.0, 20.0, ()), (50.0, 0.0, ("neck_pitch",))],
-)
-def test_joints_of_two_servos_are_judged_by_their_own_angles(
-    pitch_deg: float, roll_deg: float, far: tuple[str, ...]
-):
-    rig = replace(load_rig("desk"), couplings={"neck": DIFFERENTIAL})
-    shafts = DIFFERENTIAL.servo_rad((radians(pitch_deg), radians(roll_deg)))
-    steps = {
-        name: rig.joints[name].steps(shaft)
-        for name, shaft in zip(DIFFERENTIAL.joints, shafts, strict=True)
-    }
-    assert tuple(find_far_outside(rig.joints, [DIFFERENTIAL], steps)) == far

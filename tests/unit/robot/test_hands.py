@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from fakes.scenes import EmptyScene
 from present import present
+from text_table import rows
 
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.shared_slots import PoseBuffer
@@ -18,7 +19,7 @@ from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.frames import CameraMount, PoseHistory
 from gazerig.robot.perception.frame_locator import FrameLocator
-from gazerig.robot.perception.hands import HAND, Hands, Known
+from gazerig.robot.perception.hands import HAND, Hands, Known, known_faces, without_own_motion
 from gazerig.robot.perception.motion_source import MotionSource
 from gazerig.robot.perception.perception import Perception
 from gazerig.robot.run.surroundings import load_scene
@@ -115,48 +116,63 @@ def kinds(hands: Hands, *seen: Located, faces: tuple[Known, ...] = (FACE,)) -> l
     return [hands.label([one], list(faces), EYE, k / 30)[0].kind for k, one in enumerate(seen)]
 
 
-def test_what_moves_within_reach_is_a_hand_from_the_second_frame_on():
-    assert kinds(Hands(), *[patch()] * 3) == ["thing", HAND, HAND]
+ARMS = """
+# Tip aside and above of the face; the end of the arm's line, at the shoulder 0.19 -0.17; speed
+# aside of the tip, of the middle, and of the face; radius; whether it is a hand
+0.6  -0.17   0.19 -0.17   1.2   1.2  0    0.1    1
+0.84  0      0.19 -0.17   1.2   1.2  0    0.1    1  # within reach
+0.86  0      0.19 -0.17   1.2   1.2  0    0.1    0
+0.3   0.69   0.19 -0.17   1.2   1.2  0    0.1    1
+0.3   0.71   0.19 -0.17   1.2   1.2  0    0.1    0
+0.2  -0.79   0.19 -0.17   1.2   1.2  0    0.1    1
+0.2  -0.81   0.19 -0.17   1.2   1.2  0    0.1    0
+0.5   0.7    0.19 -0.17   1.2   1.2  0    0.1    0
+0.5   0.68   0.19 -0.17   1.2   1.2  0    0.1    1
+0.6  -0.17   0.45 -0.17   1.2   1.2  0    0.1    1  # at the shoulder
+0.6  -0.17   0.47 -0.17   1.2   1.2  0    0.1    0
+0.6  -0.17   0.19  0.09   1.2   1.2  0    0.1    1
+0.6  -0.17   0.19  0.11   1.2   1.2  0    0.1    0
+0.6  -0.17   0.19 -0.43   1.2   1.2  0    0.1    1
+0.6  -0.17   0.19 -0.45   1.2   1.2  0    0.1    0
+0.6  -0.17   0.19 -0.17   0.41  0.2  0    0.1    1  # in motion
+0.6  -0.17   0.19 -0.17   0.39  0.2  0    0.1    0
+0.6  -0.17   0.19 -0.17   -0.41 0.2  0    0.1    1
+0.6  -0.17   0.19 -0.17   1.2   1    0.7  0.1    0  # not faster than who walks
+0.6  -0.17   0.19 -0.17   1.2   1    0.55 0.1    1
+0.6  -0.17   0.19 -0.17   1.2   1    -0.7 0.1    1
+0.6  -0.17   0.19 -0.17   1.2   1.27 0    0.1    0  # fastest at its end
+0.6  -0.17   0.19 -0.17   1.2   1.25 0    0.1    1
+0.2   0.1    0.19 -0.17   1.49  1.4  0    0.1    0  # before the head
+0.2   0.1    0.19 -0.17   1.57  1.4  0    0.1    1
+0.26  0      0.19 -0.17   1.2   1.2  0    0.1    1
+0.6  -0.17   0.19 -0.17   1.2   1.2  0    0.239  1  # of an arm's size
+0.6  -0.17   0.19 -0.17   1.2   1.2  0    0.241  0
+0.6  -0.17   0.19 -0.17   1.2   1.2  0    0.041  1
+0.6  -0.17   0.19 -0.17   1.2   1.2  0    0.039  0
+"""
 
 
-@pytest.mark.parametrize(
-    "seen",
-    [patch(v=(0.0, 0.6, 0.0)), patch(p=(2.0, 2.4, 0.0)), patch(p=(2.0, 0.5, -1.9)),
-     patch(radius_m=0.6), patch(mark=3, kind="ball"), patch(p=(2.0, 0.1, 0.1)),
-     patch(p=(3.4, 0.7, -0.2), depth_measured=True, along_sd_m=0.02)],
-    # hardly moves, out of reach, a leg, a person who passes, something known, a head that turns,
-    # measured far behind
-)  # fmt: skip
-def test_what_is_no_hand_is_none(seen: Located):
-    assert HAND not in kinds(Hands(), *[seen] * 5)
+@pytest.mark.parametrize("row", rows(ARMS))
+def test_an_arm_that_moves_within_reach_is_a_hand_from_the_second_frame_on(row: list[float]):
+    aside, up, end, height, tip_m_s, middle_m_s, face_m_s, radius_m, is_hand = row
+    # Its speed counts across the view: to the side, seen from aside, by less.
+    tip, middle = (1.0, aside, up), (1.0, 0.5 * (aside + end), 0.5 * (up + height))
+    seen = patch(middle, (0.0, middle_m_s, 0.0), radius_m, fastest_m=tip, depth_measured=True)
+    toward = np.hypot(1.0, up) / np.sqrt(1.0 + aside**2 + up**2)
+    seen = seen._replace(
+        fastest_m_s=(0.0, tip_m_s / toward, 0.0), v_m_s=(0.0, middle_m_s / toward, 0.0)
+    )
+    walks: Known = (FACE[0], (0.0, face_m_s / toward, 0.0))
+    assert kinds(Hands(), *[seen] * 3, faces=(walks,)) == [
+        "thing",
+        *[HAND if is_hand else "thing"] * 2,
+    ]
+
+
+def test_what_is_known_or_nobodys_is_no_hand():
+    assert HAND not in kinds(Hands(), *[patch(mark=3, kind="ball")] * 5)
     assert HAND not in kinds(Hands(), *[patch()._replace(detector_id=None)] * 5)
     assert HAND not in kinds(Hands(), *[patch()] * 5, faces=())
-
-
-def led(tip: Vec3, middle: Vec3, **more: object) -> Located:
-    """Return a patch that is fastest at its tip."""
-    return patch(p=middle, fastest_m=tip, **more)  # type: ignore[arg-type]
-
-
-CURTAIN = led((2.0, 1.3, 0.1), (2.0, 1.5, -0.1), radius_m=0.45, thickness_m=0.5)
-
-
-@pytest.mark.parametrize(
-    "seen",
-    [CURTAIN, led((2.0, 1.1, -0.9), (2.0, 0.9, -0.2)), led((2.0, 0.4, -0.4), (2.0, 0.9, -0.9)),
-     patch(radius_m=0.08)],
-    # a curtain, a thing aside, an elbow, too small for an arm
-)  # fmt: skip
-def test_what_moves_within_reach_is_a_thing_without_evidence_of_a_hand(
-    seen: Located,
-):
-    assert kinds(Hands(), *[seen] * 6) == ["thing"] * 6
-
-
-def test_the_legs_of_somebody_who_walks_are_no_hands_and_a_wave_while_walking_is():
-    walks: Known = (FACE[0], (0.0, 1.0, 0.0))
-    assert HAND not in kinds(Hands(), *[patch(v=(0.0, 0.4, 0.0))] * 4, faces=(walks,))
-    assert HAND in kinds(Hands(), *[patch(v=(0.0, -1.6, 0.0))] * 4, faces=(walks,))
 
 
 def test_a_hand_remains_one_where_it_turns_or_passes_before_the_face_and_not_for_long():
@@ -178,17 +194,6 @@ def test_a_hand_that_has_come_to_rest_is_still_there_and_one_that_went_is_not(
     assert there[11][0][0] == HAND
     assert there[12:71] == [[(HAND, (0.0, 0.0, 0.0))] if stays else []] * 59
     assert there[-1] == [] and not hands.resting
-
-
-def test_a_hand_is_as_far_as_the_person_unless_its_distance_is_measured():
-    for measured, far in ((False, 1.0), (True, 0.62)):
-        p: Vec3 = (0.6, 0.15, -0.05) if measured else (2.0, 0.5, -0.2)
-        hands, seen = Hands(), patch(p=p, depth_measured=measured, along_sd_m=0.02)
-        for k in range(3):
-            (found,) = hands.label([seen], [FACE], EYE, k / 30)
-        assert level(found.p_m) == pytest.approx(far, abs=0.01)
-        assert found.v_m_s is not None
-        assert found.v_m_s[1] == pytest.approx(1.2 * dist(found.p_m, EYE) / dist(p, EYE))
 
 
 def test_between_two_people_the_arm_tells_whose_hand_it_is_and_it_stays_theirs():
@@ -249,17 +254,16 @@ FIST: Located = patch(radius_m=0.13 * 2.0, compact=True)
 
 def test_what_is_too_large_for_a_hand_at_the_persons_distance_is_as_near_as_makes_it_one():
     hands, far = Hands(), []
-    for k in range(12):
-        (found,) = hands.label([FIST._replace(radius_m=0.26 + 0.01 * k)], [FACE], EYE, k / 30)
+    for k in range(8):  # then it is drawn back, or goes on as an arm
+        seen = FIST if k < 4 else patch(radius_m=0.2)
+        (found,) = hands.label([seen], [FACE], EYE, k / 30)
         far.append(level(found.p_m))
-    size_m = (0.26 + 0.11) * 1.0 / level(FIST.p_m)  # as far away as the person
-    assert far[-1] == pytest.approx(0.065 / size_m, rel=0.1)
-    assert far[-1] < 0.45 and found.v_m_s is not None
-    assert found.v_m_s[1] == pytest.approx(1.2 * far[-1] / level(FIST.p_m))
-    # A hand that is drawn back, or goes on as an arm, is at the person's distance again.
-    for k in range(12, 20):
-        (found,) = hands.label([patch(radius_m=0.2)], [FACE], EYE, k / 30)
-    assert level(found.p_m) == pytest.approx(1.0, abs=0.02)
+        assert found.v_m_s == pytest.approx((0.0, 1.2 * far[-1] / level(FIST.p_m), 0.0)) or k == 0
+    near = 0.065 / (0.26 / level(FIST.p_m))  # of its size, as far away as the person
+    left = 1.0 - near
+    assert far[1:] == pytest.approx(
+        [near, near, near, 1.0 - left / 2, 1.0 - left / 4, 1.0 - left / 8, 1.0 - left / 16]
+    )
 
 
 def reaching(wide_m: float, **more: object) -> Located:
@@ -269,11 +273,76 @@ def reaching(wide_m: float, **more: object) -> Located:
 
 
 def test_an_arm_that_comes_in_at_the_side_is_as_near_as_makes_it_as_wide_as_a_hand():
-    hands = Hands()
-    seen = [reaching(0.17)] * 3 + [reaching(0.06)] * 3 + [reaching(0.25)] * 2
+    hands, exact = Hands(), level(BESIDE) / 2.1
+    seen = [reaching(0.17), reaching(0.34), reaching(0.17), reaching(0.06), reaching(0.25)]
     away = [level(hands.label([one], [FACE], EYE, k / 30)[0].p_m) for k, one in enumerate(seen)]
-    assert away[1:] == pytest.approx([0.5] * 7, abs=0.03), "and stays there as less of it moves"
+    mean = [(0.5 + 0.25) / 2, *[(0.5 + 0.25 + 0.5) / 3] * 3]
+    assert away[1:] == pytest.approx([exact * one for one in mean])
     own = Hands()
     for k in range(6):
         (hand,) = own.label([reaching(0.17, p=(2.0, 0.5, -0.2))], [FACE], EYE, k / 30)
-    assert level(hand.p_m) == pytest.approx(1.0, abs=0.03)  # from the person's own shoulder
+    assert level(hand.p_m) == pytest.approx(1.0)  # from the person's own shoulder
+    for wide_m, side in ((0.118, True), (0.17, False)):  # not as wide, or not at the side
+        inside = Hands()
+        for k in range(3):
+            (arm,) = inside.label([reaching(wide_m, from_side=side)], [FACE], EYE, k / 30)
+        assert arm.kind == "thing"
+
+
+BODIES = """
+# Aside of the face, 20 m away, and above it; how much deeper; whether that is measured; speed
+# aside of the patch and of the face; whether it is a part of the person, and on the head
+0.249  0      0     1  9     0     1 1  # on the head
+-0.249 0      0     1  9     0     1 1
+0      0.249  0     1  9     0     1 1
+0.251  0      0     1  9     0     0 0
+0.251  0      0     1  0     0     1 0
+0.349  0      0     1  0     0     1 0  # on the body
+0.351  0      0     1  0     0     0 0
+0      -1.69  0     1  0     0     1 0
+0      -1.71  0     1  0     0     0 0
+0.1    0.24   0     1  0     0     1 0
+0.1    0.26   0     1  0     0     0 0
+0      0      0.69  1  9     0     1 1  # at its depth
+0      0      0.71  1  9     0     0 0
+0      0      -0.71 1  9     0     0 0
+0      0      -10   0  9     0     1 1
+0      -1     0     1  0.29  0     1 0  # moves as it does
+0      -1     0     1  0.31  0     0 0
+0      -1     0     1  -0.31 0     0 0
+0      -1     0     1  0.51  1     1 0
+0      -1     0     1  0.49  1     0 0
+0      -1     0     1  1.51  1     0 0
+0      -1     -10   0  0.145 0     1 0
+0      -1     -10   0  0.155 0     0 0
+0      -1     0     1  none  0     1 0
+0      -1     0     1  9     none  1 0
+"""
+
+
+@pytest.mark.parametrize("row", rows(BODIES))
+def test_what_moves_on_the_body_of_a_person_is_theirs(row: list[Any]):
+    aside, up, deeper, measured, v, v_face, own, on_head = row
+    turn, lift, far = 2.0 * np.arcsin(aside / 40.0), np.arcsin(up / 20.0), 20.0 + deeper
+    way = np.cos(lift) * np.cos(turn), np.cos(lift) * np.sin(turn), np.sin(lift)
+    speeds = [None if one == "none" else (0.0, one, 0.0) for one in (v, v_face)]
+    thing = Located("thing", tuple(far * np.array(way)), None, 0.1, -2.0, along_sd_m=0.1)
+    thing = thing._replace(v_m_s=speeds[0], depth_measured=bool(measured))
+    face = Located("face", (20.0, 0.0, 0.0), None, 0.1)
+    known: list[Known] = [((0.0, 9.0, 0.0), None), (face.p_m, speeds[1])]
+    other = face._replace(p_m=known[0][0])
+    turned, others, carried = without_own_motion([other, face], [thing], known, EYE)
+    assert turned == [other, face._replace(spin_rad_s=-2.0 * on_head)]
+    assert (others, carried) == ([] if own else [thing], [])
+    assert without_own_motion([other], [thing], known, EYE)[2] == [(0, thing)] * int(own)
+    hand = thing._replace(kind=HAND)
+    assert without_own_motion([other, face], [hand], known, EYE)[1] == [hand]
+
+
+def test_a_face_has_the_velocity_of_its_track():
+    face = Located("face", (2.0, 0.0, 0.0), None, 0.1)
+    moves: Vec3 = (1.0, 2.0, 3.0)
+    for away, v in ((0.24, moves), (0.26, None)):
+        tracked: list[Known] = [((2.0, 1.0, 0.0), EYE), ((2.0, 0.0, away), moves)]
+        assert known_faces([face], tracked) == [(face.p_m, v), *tracked]
+    assert known_faces([face], []) == [(face.p_m, None)]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from seen_people import HEIGHT, LENS, STILL, WIDTH, face_at, seen
 
 from gazerig.drivers.types import Clothing, DetectedPerson, MovingBlob
-from gazerig.gaze.types import Percept, Vec3
+from gazerig.gaze.types import Vec3
 from gazerig.robot.model.face_geometry import PARTS_FACE_M
 from gazerig.robot.model.frames import CameraMount, CameraParams
 from gazerig.robot.model.intrinsics import project
@@ -69,41 +69,6 @@ def blob_at(p: Vec3, v: Vec3, known: bool = True, **more: Any) -> MovingBlob:
         1, "thing", p, 0.2, v_camera_m_s=v, depth_known=known, depth_sd_m=0.05 if known else 1.0
     )
     return replace(made, box_px=(0.0, 0.0, 10.0, 10.0), **more)
-
-
-def walking(blob: MovingBlob) -> Percept:
-    """Return what is seen of a face that has been walking to the right for a second."""
-    perception = Perception(STILL, 69.0)
-    for number in range(1, 31):
-        x = -0.25 + 0.5 * number / 30
-        blobs = (blob,) if number == 30 else ()
-        percept = seen(perception, number, faces=(face_at((x, 0.0, 1.5)),), blobs=blobs)
-    return percept
-
-
-@pytest.mark.parametrize(
-    ("blob", "own"),
-    [
-        (blob_at((0.25, 0.5, 1.5), (0.5, 0.0, 0.0)), True),  # the trunk
-        (blob_at((0.33, 0.67, 2.0), (0.67, 0.0, 0.0), known=False), True),
-        (blob_at((0.26, 0.02, 1.5), (-0.4, 0.4, 0.0)), True),  # on the head
-        (blob_at((0.25, 0.3, 1.5), (-0.8, 0.6, 0.0)), False),  # a waving arm
-        (blob_at((0.25, 0.8, 2.4), (0.5, 0.0, 0.0)), False),  # far behind
-        (blob_at((0.25, -0.5, 1.5), (0.5, 0.0, 0.0)), False),  # above
-        (replace(blob_at((0.25, 0.5, 1.5), (0.5, 0.0, 0.0)), kind="hand"), False),
-    ],
-)
-def test_a_persons_own_motion_is_no_second_body(blob: MovingBlob, own: bool):
-    percept = walking(blob)
-    assert len(percept.faces) == 1
-    assert ("face", blob.kind)[: 1 if own else 2] == percept.bodies.kinds
-
-
-def test_a_head_that_rolls_spins_as_a_body():
-    """Clockwise in the picture is about the line of view, away from the camera."""
-    percept = walking(blob_at((0.26, 0.02, 1.5), (0.0, 0.0, 0.0), spin_rad_s=2.0))
-    w = percept.bodies.w_world_rad_s[0]
-    assert np.linalg.norm(w) == pytest.approx(2.0) and w[0] > 1.9
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])

@@ -3,14 +3,14 @@
 from collections import deque
 from collections.abc import Callable, Iterable
 from itertools import pairwise
-from math import cos, degrees, inf, nan, radians, sin
+from math import degrees, inf, nan, radians, sin
 from typing import Any
 
 import numpy as np
 import pytest
 from desk import GAZE_JOINTS
 from gaze_targets import joints_at
-from guarded_desk import DT, EYE, LIMITS, NECK, ZERO, guarding
+from guarded_desk import DT, LIMITS, NECK, ZERO, guarding
 
 from gazerig.config.validation import validate
 from gazerig.robot.model.guard_params import CollisionParams, GuardParams
@@ -45,23 +45,6 @@ def reason_of(verdict: GuardResult, joint: str) -> str:
     return verdict.why[verdict.joints.index(joint)] if verdict.why else ""
 
 
-def test_a_wish_inside_everything_passes_unchanged():
-    wishes = [(0.05 * (1.0 - cos(2.0 * k * DT)),) * 9 for k in range(1, 400)]
-    for desired, verdict in zip(wishes, driven(guarding(), wishes), strict=True):
-        assert verdict.command_rad == pytest.approx(desired, abs=1e-12)
-        assert verdict.level == "ok" and verdict.reasons == () and verdict.why == ()
-
-
-def test_whoever_commands_is_told_what_became_of_every_joint():
-    verdict = driven(guarding(), [but(6, radians(51.0), 0.0001)])[0]
-    permitted = verdict.command_rad[6]
-    assert 0.0 < permitted < radians(0.1)
-    assert verdict.desired_rad[6] == radians(51.0)
-    assert reason_of(verdict, "neck_yaw") == "out of range"
-    assert verdict.command_rad[0] == 0.0001 and reason_of(verdict, "left_eye_pan") == ""
-    assert verdict.reasons == ("neck_yaw: out of range",)
-
-
 @pytest.mark.parametrize("joint", EACH_KIND)
 def test_range_is_swept_densely_at_its_edges(joint: int):
     limit = LIMITS[joint]
@@ -74,68 +57,25 @@ def test_range_is_swept_densely_at_its_edges(joint: int):
             assert verdict.command_rad[joint - 1] == 0.0
 
 
-@pytest.mark.parametrize("joint", EACH_KIND)
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_speed_is_swept_densely_at_its_limit(joint: int, way: float):
-    soft = tuple(limit._replace(accel_rad_s2=1e9) for limit in LIMITS)
-    for share in [*np.linspace(0.95, 1.05, 21).tolist(), 1.0 - 1e-12, 1.0 + 1e-6]:
-        step = way * LIMITS[joint].speed_rad_s * DT * share
-        verdict = driven(guarding(limits=soft), [but(joint, step)])[0]
-        assert abs(verdict.command_rad[joint]) <= abs(step / share) * (1.0 + 1e-12)
-        assert (reason_of(verdict, GAZE_JOINTS[joint]) == "too fast") == (share > 1.0 + 1e-9)
-
-
-@pytest.mark.parametrize("joint", EACH_KIND)
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_acceleration_is_swept_densely_at_its_limit(joint: int, way: float):
-    for share in [*np.linspace(0.95, 1.05, 21).tolist(), 1.0 - 1e-12]:
-        step = way * LIMITS[joint].accel_rad_s2 * DT * DT * share
-        verdict = driven(guarding(), [but(joint, step)])[0]
-        assert abs(verdict.command_rad[joint]) <= abs(step / share) * (1.0 + 1e-12)
-        assert (reason_of(verdict, GAZE_JOINTS[joint]) == "too hard") == (share > 1.0 + 1e-9)
-
-
-@pytest.mark.parametrize("joint", EACH_KIND)
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_braking_before_the_end_of_the_range_is_swept_densely(joint: int, way: float):
-    limit = LIMITS[joint]
-    edge = limit.high_rad if way > 0.0 else limit.low_rad
-    for share in np.linspace(0.1, 1.0, 10).tolist():
-        pace = way * limit.speed_rad_s * share * DT
-        began = int(0.9 * (limit.high_rad - limit.low_rad) / abs(pace))
-        guard = guarding(but(joint, edge - began * pace))
-        wishes = [but(joint, edge + (k - began) * pace) for k in range(began + 40)]
-        path = np.array([verdict.command_rad[joint] for verdict in driven(guard, wishes)])
-        speeds = np.diff(path, prepend=edge - began * pace) / DT
-        assert (np.abs(np.diff(speeds, prepend=0.0)) <= limit.accel_rad_s2 * DT + 1e-6).all()
-        assert (way * path <= way * edge).all() and abs(path[-1] - edge) < 1e-3
-
-
-@pytest.mark.parametrize("joint", [0, 6])
-@pytest.mark.parametrize("tick", [0.001, 0.005, 0.02, 0.1])
-def test_a_wish_that_jumps_is_met_without_running_past_it(joint: int, tick: float):
-    for jump in np.linspace(-0.5, 0.5, 5).tolist():
-        guard, t, path = guarding(), 0.0, [0.0]
-        for _ in range(max(40, int(1.5 / tick))):
-            t += tick
-            state = joints_at(but(joint, path[-1]), t)
-            path.append(guard.check(but(joint, jump), state, 0.0, t).command_rad[joint])
-        assert path[-1] == pytest.approx(jump, abs=1e-9)
-        assert max(abs(p) for p in path) <= abs(jump) + LIMITS[joint].accel_rad_s2 * tick**2
-
-
-def test_a_wish_that_moves_is_caught_up_with():
-    wishes = [(0.2 + 0.5 * k * DT,) * 9 for k in range(120)]  # a jump, then a steady pace
-    last = driven(guarding(), wishes)[-1]
-    assert last.level == "ok" and last.command_rad == pytest.approx(wishes[-1])
-
-
-def test_a_loop_that_was_stopped_goes_on_without_a_leap():
-    guard = guarding()
-    guard.check(ZERO, joints_at(ZERO, DT), 0.0, DT)
-    verdict = guard.check((0.5,) * 9, joints_at(ZERO, 10.0), 0.0, 10.0)  # ten seconds later
-    assert 0.0 < verdict.command_rad[6] <= NECK.speed_rad_s * 0.1
-    assert verdict.reasons
+@pytest.mark.parametrize(
+    ("off_deg", "reason"),
+    # In a tick of 5 ms a neck at rest moves by 0.0375 deg, and at most by 1 deg.
+    [
+        (0.0375, ""),
+        (0.0376, "too hard"),
+        (0.999, "too hard"),
+        (1.001, "too fast"),
+        (50.1, "out of range"),
+    ],
+)
+@pytest.mark.parametrize("way", [1.0, -1.2])
+def test_a_wish_is_shortened_for_one_reason(off_deg: float, reason: str, way: float):
+    wish = radians(off_deg) * (way if off_deg > 50.0 else way / abs(way))
+    (verdict,) = driven(guarding(), [but(6, wish)])
+    assert reason_of(verdict, "neck_yaw") == reason and verdict.desired_rad[6] == wish
+    moved = min(abs(wish), radians(0.0375)) * way / abs(way)
+    assert verdict.command_rad == pytest.approx(but(6, moved), abs=1e-12)
+    assert verdict.level == ("limited" if reason else "ok")
 
 
 def test_not_finite_wishes_hold_and_say_so():
@@ -162,15 +102,6 @@ def test_ages_of_joints_and_picture_are_swept_densely(joint: int):
         assert verdict.command_rad[joint] == (0.0 if moved else 0.0001)
 
 
-def test_a_neck_without_pictures_holds_whatever_is_wished():
-    for wish in (0.0001, 0.5):
-        for age_s, held in ((1.499, False), (1.501, True)):
-            verdict = guarding().check((wish,) * 9, joints_at(ZERO, DT), age_s, DT)
-            assert (verdict.command_rad[6] == 0.0) == held
-            assert (reason_of(verdict, "neck_yaw") == "stale frame") == held
-            assert verdict.command_rad[0] > 0.0
-
-
 def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish():
     guard = guarding((0.5,) * 9, gentle=True, soft_start_speed_deg_s=60.0)
     path, t = [0.5], 0.0
@@ -181,34 +112,17 @@ def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish(
     speeds = np.diff(path) / DT
     assert np.abs(speeds).max() <= radians(60.0) + 1e-9
     assert np.abs(np.diff(speeds)).max() / DT <= radians(301.0)
-    assert not any(guard._gentle) and abs(path[-1]) < radians(1.0) and t >= 1.0
+    assert not any(guard._gentle) and abs(path[-1]) < radians(1.0)
+    assert t == pytest.approx(1.0, abs=1.1 * DT)
     assert all(b <= a + SLACK for a, b in pairwise(path))
     assert driven(guard, [(0.3,) * 9] * 100, t)[-1].command_rad[0] == pytest.approx(0.3)
-
-
-def test_going_gently_in_flight_brakes_within_the_joints_own_strength():
-    path: list[Any] = []
-    guard, t = guarding(), 0.0
-    for k in range(60):
-        t += DT
-        if k == 15:
-            guard.start_gently()
-        position = (0.0,) * 6 + ((path[-1] if path else 0.0),) * 3
-        desired = (0.0,) * 6 + (0.8,) * 3
-        path.append(guard.check(desired, joints_at(position, t), 0.0, t).command_rad[6])
-    speeds = np.diff(path) / DT
-    assert np.abs(np.diff(speeds)).max() / DT <= NECK.accel_rad_s2 + 1e-6
-    assert speeds[-1] <= radians(60.0) + 1e-9
-
-
-def test_a_start_outside_the_range_is_brought_to_its_edge():
-    guard = guarding((2.0,) * 9, gentle=True)
-    assert guard.check((2.0,) * 9, joints_at(ZERO, DT), 0.0, DT).command_rad[0] == EYE.high_rad
 
 
 def test_time_that_stands_still_moves_nothing():
     guard = guarding()
     guard.check((0.1,) * 9, joints_at(ZERO, DT), 0.0, DT)
+    new = Guard(GuardParams(), LIMITS, GAZE_JOINTS).check(ZERO, joints_at(ZERO), 0.0, 0.0)
+    assert new.command_rad == pytest.approx((0.0,) * 6 + (radians(-5.0),) * 3)
     for odd in (DT, 0.0, nan, inf, -inf):
         again = guard.check((0.2,) * 9, joints_at(ZERO, DT), 0.0, odd)
         assert again.level == "hold" and again.reasons == ("all: time does not advance",)
@@ -287,7 +201,11 @@ def test_a_joint_that_is_met_on_its_way_gives_way_too():
     world.wall = radians(12.0)
     while world.tick(0.6) != "not moving":
         assert world.t_s < 1.0
-    for _ in range(120):
+    for _ in range(60):
+        world.tick(0.6)
+    assert world.path[-1] == pytest.approx(radians(12.0), abs=STEP)
+    world.wall = radians(11.0)  # it does not sink with the joint
+    for _ in range(20):
         world.tick(0.6)
     assert world.path[-1] == pytest.approx(radians(12.0), abs=STEP)
     world.wall = radians(5.0)  # pushed back: it yields once more
@@ -335,55 +253,12 @@ def test_healthy_joints_are_left_alone(joint: int, lag_s: float, band_deg: float
         assert world.tick(desired, silent, dt_s) != "not moving"
 
 
-def test_a_slow_start_is_no_jam():
-    world = World(6, 0.03, 0.6)
-    world.guard.start_gently()
-    for k in range(600):
-        if k == 300:
-            world.guard.start_gently()
-        assert world.tick(0.5 if k < 300 else -0.5) != "not moving"
-
-
-@pytest.mark.parametrize("off_deg", np.linspace(2.5, 3.5, 11).tolist())
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_the_distance_is_swept_densely(off_deg: float, way: float):
-    guard, found = guarding(), False
-    for k in range(1, 60):
-        joints = joints_at((-way * radians(off_deg),) * 9, k * DT)
-        verdict = guard.check(ZERO, joints, 0.0, k * DT)
-        found = found or verdict.level == "hold"
-        assert not found or set(verdict.why) == {"not moving"}
-    assert found == (off_deg > 3.0 + 1e-9)
-
-
-@pytest.mark.parametrize("creep_deg_s", [1.0, 2.5, 3.0, 3.7, 4.0, 6.0, -1.0, -6.0, -20.0])
-def test_only_motion_towards_the_command_counts(creep_deg_s: float):
-    guard, found = guarding((0.6,) * 9), False
-    for k in range(1, 100):
-        at = radians(5.0 + creep_deg_s * k * DT)
-        joints = joints_at((at,) * 9, k * DT)
-        found = found or guard.check((0.6,) * 9, joints, 0.0, k * DT).level == "hold"
-    assert found == (creep_deg_s < 0.5 / 0.15)
-
-
 def test_a_silent_joint_is_stale_and_not_stuck():
     world = World(6)
     world.tick(0.0)
     world.wall = 0.0
     reasons = {world.tick(0.5, silent=True) for _ in range(100)}
     assert "stale joints" in reasons and "not moving" not in reasons
-
-
-def test_a_stuck_joint_lets_the_others_move():
-    guard = guarding(gentle=True)
-    command: tuple[float, ...] = ZERO
-    verdict = None
-    for k in range(1, 500):
-        joints = joints_at((0.0, *command[1:]), k * DT)
-        verdict = guard.check((0.3,) * 9, joints, 0.0, k * DT)
-        command = verdict.command_rad
-    assert verdict is not None and command[1:] == pytest.approx((0.3,) * 8)
-    assert abs(command[0]) < radians(4.6)
 
 
 # --- Heat, load, voltage, torque and latched faults: slower first, then still, then limp
@@ -438,6 +313,7 @@ def world() -> ServoWorld:
 
 @pytest.mark.parametrize("celsius", np.linspace(50.0, 75.0, 26).tolist())
 def test_heat_slows_a_joint_down_before_it_stops_it(world: ServoWorld, celsius: float):
+    assert celsius >= 65.0 or world.tick(0.0, temperature_c=celsius).level == "ok"
     verdicts = [world.tick(0.5, temperature_c=celsius) for _ in range(60)]
     share = min(max(1.0 - 0.8 * (celsius - 55.0) / 10.0, 0.0), 1.0)
     speeds = world.speeds()
@@ -459,26 +335,6 @@ def test_a_hot_joint_goes_on_slowly_when_it_has_cooled(world: ServoWorld):
     assert [reason(verdict) for verdict in verdicts] == ["hot"] * 4 + ["starting slowly"]
 
 
-@pytest.mark.parametrize("load", [*np.linspace(0.3, 1.0, 15).tolist(), -0.6, -1.0])
-def test_load_slows_a_joint_down_before_it_stops_it(world: ServoWorld, load: float):
-    stopped = slower = None
-    for k in range(1000):
-        verdict = world.tick(0.001 * k * DT, load=load)
-        if slower is None and world.guard._health.share[JOINT] < 1.0:
-            slower = k * DT
-        if verdict.level == "hold":
-            assert reason(verdict) == "overloaded"
-            stopped = k * DT
-            break
-    if abs(load) <= 0.5:
-        assert slower is None and stopped is None
-        return
-    bearable_s = 0.7 * (1.0 - 0.25) / (load * load - 0.25)
-    if bearable_s < 4.9:
-        assert stopped == pytest.approx(bearable_s, abs=3 * DT)
-        assert slower == pytest.approx(0.5 * bearable_s, abs=3 * DT)
-
-
 def test_full_load_is_let_go_before_the_servo_would(world: ServoWorld):
     verdict = world.tick(0.0, load=0.0)
     while verdict.level != "hold":
@@ -493,50 +349,6 @@ def test_full_load_is_let_go_before_the_servo_would(world: ServoWorld):
     while verdict.level == "hold":
         verdict = world.tick(0.08, stray=verdict.command_rad[JOINT], load=0.1)
     assert reason(verdict) == "starting slowly" and world.t_s - full_s > 1.0
-
-
-def test_short_bursts_of_load_strain_nothing(world: ServoWorld):
-    for k in range(2000):  # a saccade of 60 ms at full load, three times a second
-        assert world.tick(0.0, load=1.0 if k % 66 < 12 else 0.1).level == "ok"
-
-
-@pytest.mark.parametrize("volts", np.linspace(3.0, 7.5, 31).tolist())
-def test_voltage_slows_a_joint_down_before_it_stops_it(world: ServoWorld, volts: float):
-    first_hold = None
-    for k in range(160):
-        verdict = world.tick(0.5, voltage_v=volts)
-        if verdict.level == "hold" and first_hold is None:
-            assert reason(verdict) == "voltage"
-            first_hold = k * DT
-    room = min(volts - 3.5, 7.0 - volts)
-    if room < 0.0:
-        assert first_hold == pytest.approx(0.5, abs=2 * DT)
-        return
-    share = min(0.2 + 0.8 * room / 0.3, 1.0)
-    assert first_hold is None
-    assert world.speeds().max() <= share * NECK.speed_rad_s + 1e-9
-    assert world.speeds().max() >= 0.9 * share * NECK.speed_rad_s
-
-
-def test_a_short_sag_of_the_voltage_only_slows(world: ServoWorld):
-    for k in range(400):
-        assert world.tick(0.5, voltage_v=3.4 if k % 100 < 49 else 5.0).level != "hold"
-
-
-def test_a_supply_that_recovers_when_nothing_moves_is_given_a_rest(world: ServoWorld):
-    while world.tick(0.5, voltage_v=3.3).level != "hold":
-        pass
-    rest = 0
-    while world.tick(0.5, voltage_v=5.0).level == "hold":
-        rest += 1
-    assert rest * DT == pytest.approx(0.5, abs=2 * DT)
-
-
-def test_unknown_values_strain_nothing(world: ServoWorld):
-    for _ in range(100):
-        verdict = world.tick(0.0, temperature_c=None, voltage_v=None, load=nan)
-        assert verdict.level == "ok"
-    assert world.tick(0.0, temperature_c=nan, voltage_v=nan).level == "ok"
 
 
 def test_torque_off_holds_and_goes_along_with_the_joint(world: ServoWorld):
@@ -578,6 +390,25 @@ def test_what_still_moves_with_a_fault_moves_slowly_and_the_others_as_they_shoul
     assert ServoWorld().tick(0.5, fault="encoder", torque=True).command_rad[JOINT] == 0.0
 
 
+def test_a_reset_begins_anew():
+    guard, hot = guarding((0.1,) * 9), {"temperature_c": (66.0,) * 9}
+    for k in range(1, 60):  # hot, and far from its command
+        verdict = guard.check(ZERO, joints_at((0.3,) * 9, k * DT, **hot), 0.0, k * DT)
+    assert set(verdict.why) == {"not moving"}
+    guard.reset(k * DT, ZERO)
+    t_s = (k + 1) * DT
+    warm = joints_at(ZERO, t_s, temperature_c=(64.0,) * 9)
+    assert set(guard.check((0.5,) * 9, warm, 0.0, t_s).why) == {"starting slowly"}
+    guard = guarding(limits=(NECK,) * 9, gentle=True, period_s=DT)
+    t_s, at = 0.0, [0.0]
+    for k in range(50):  # a late tick at full slow speed, then slowly again from there
+        t_s += DT if k != 48 else 5 * DT
+        at.append(guard.check((0.8,) * 9, joints_at(at[-1:] * 9, t_s), 0.0, t_s).command_rad[0])
+        if k == 48:
+            guard.start_gently()
+    assert at[-1] - 2.0 * at[-2] + at[-3] <= radians(300.0) * DT * DT + 1e-9
+
+
 def test_a_rearmed_joint_begins_where_it_is(world: ServoWorld):
     for _ in range(40):
         world.tick(0.4)
@@ -606,46 +437,33 @@ def test_a_joint_whose_ticks_do_not_come_goes_on_from_its_goal_softly():
     for missed in (2, 10, 400):
         guard = guarding((LOW,) * 9, (limit,) * 9, period_s=DT)
         t_s, before, speed = 0.0, LOW, 0.0
-        for k in range(16):
+        for k in range(20):
             t_s += DT if k != 8 else missed * DT
             joints = joints_at((before,) * 9, t_s)
-            now = guard.check((HIGH,) * 9, joints, 0.0, t_s).command_rad[0]
-            if k >= 8:
+            verdict = guard.check((HIGH,) * 9, joints, 0.0, t_s)
+            now = verdict.command_rad[0]
+            if k not in (18, 19):
+                assert ("late tick" in verdict.why[0]) == (8 <= k < 18)
+            assert k < 19 or verdict.why[0] in ("too fast", "too hard")
+            if 8 <= k < 18:
                 braked = max(0.0, speed - accel * (missed - 1) * DT) if k == 8 else speed
                 assert (now - before) / DT <= braked + LATE_RAD_S2 * DT + 1e-9
             before, speed = now, (now - before) / DT
 
 
 def test_a_slow_joint_regains_its_speed_after_late_ticks_and_no_more():
-    """Every third tick misses some slots."""
-    for missed in (2, 60):
-        guard = guarding(
-            (LOW,) * 9, (NECK,) * 9, gentle=True, period_s=DT, soft_start_speed_deg_s=20.0
-        )
-        t_s, before, fastest, last = 0.0, LOW, 0.0, 0.0
-        for k in range(1, 400):
-            gap = missed if k % 3 == 0 else 0
-            t_s += (1 + gap) * DT
-            joints = joints_at((before,) * 9, t_s)
-            now = guard.check((HIGH,) * 9, joints, 0.0, t_s).command_rad[0]
-            speed, before = (now - before) / DT, now
-            assert speed <= min(radians(20.0), fastest + SOFT_START_RAD_S2 * DT) + 1e-9
-            braked = max(0.0, last - ACCEL * gap * DT)
-            assert abs(speed - braked) <= ACCEL * DT + 1e-9
-            if gap > 50:  # longer than that it begins as from rest
-                assert speed <= braked + SOFT_START_RAD_S2 * DT + 1e-9
-            fastest, last = max(fastest, speed), speed
-        assert (now > LOW + 0.2) == (missed == 2)
-
-
-def test_a_loop_that_always_takes_two_slots_is_a_slower_loop():
-    guard = guarding((LOW,) * 9, (NECK,) * 9, period_s=DT)
-    before = LOW
-    for k in range(1, 25):
-        joints = joints_at((before,) * 9, 2 * k * DT)
-        now = guard.check((HIGH,) * 9, joints, 0.0, 2 * k * DT).command_rad[0]
-        speed, before = (now - before) / (2 * DT), now
-    assert speed > 0.8 * TOP
+    """Every third tick misses two slots."""
+    guard = guarding((LOW,) * 9, (NECK,) * 9, True, DT, soft_start_speed_deg_s=20.0)
+    t_s, before, fastest, last = 0.0, LOW, 0.0, 0.0
+    for k in range(1, 400):
+        gap = 2 * (k % 3 == 0)
+        t_s += (1 + gap) * DT
+        now = guard.check((HIGH,) * 9, joints_at((before,) * 9, t_s), 0.0, t_s).command_rad[0]
+        speed, before = (now - before) / DT, now
+        assert speed <= min(radians(20.0), fastest + SOFT_START_RAD_S2 * DT) + 1e-9
+        assert abs(speed - max(0.0, last - ACCEL * gap * DT)) <= ACCEL * DT + 1e-9
+        fastest, last = max(fastest, speed), speed
+    assert now > LOW + 0.2
 
 
 def test_a_servo_without_feedback_is_never_found_stalled():
@@ -669,7 +487,6 @@ class PairWorld:
     def __init__(self, *pairs: CollisionParams, **start_deg: float) -> None:
         start = tuple(radians(start_deg.get(name, 0.0)) for name in GAZE_JOINTS)
         self.guard = guarding(start, gentle=True, collisions=pairs)
-        self.pairs = pairs
         self.t_s = 0.0
         self.path = [start]
         self.measured: Callable[[tuple[float, ...]], tuple[float, ...]] = lambda angles: angles
@@ -689,29 +506,6 @@ class PairWorld:
     def angle(self, joint: int) -> float:
         return degrees(self.path[-1][joint])
 
-    def crossed(self) -> bool:
-        """Whether the straight path between any two successive commands touches a box."""
-        path = np.degrees(np.array(self.path))
-        for pair in self.pairs:
-            (first, *one), (second, *other) = pair.first, pair.second
-            places = path[:, [GAZE_JOINTS.index(first), GAZE_JOINTS.index(second)]]
-            low, high = np.array([one, other]).T
-            if touches(places[:-1], places[1:], low, high).any():
-                return True
-        return False
-
-
-def touches(begin: np.ndarray, end: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Whether the straight line of each step (n, 2) meets the box, by slabs."""
-    way = end - begin
-    with np.errstate(divide="ignore", invalid="ignore"):
-        a, b = (low - begin) / way, (high - begin) / way
-    still = way == 0.0
-    inside = (begin >= low) & (begin <= high)
-    enter = np.where(still, np.where(inside, -np.inf, np.inf), np.minimum(a, b)).max(axis=1)
-    leave = np.where(still, np.where(inside, np.inf, -np.inf), np.maximum(a, b)).min(axis=1)
-    return (enter <= leave) & (enter <= 1.0) & (leave >= 0.0)
-
 
 def test_one_joint_waits_at_its_wall_and_the_other_is_free():
     world = PairWorld(LID).awake()
@@ -726,55 +520,6 @@ def test_one_joint_waits_at_its_wall_and_the_other_is_free():
         verdict = world.tick(neck_pitch=-25.0, left_upper_lid=20.0)
     assert world.angle(LEFT) == pytest.approx(9.0) and world.angle(PITCH) == pytest.approx(-25.0)
     assert verdict.reasons == ("left_upper_lid: self-collision",)
-    for _ in range(400):
-        verdict = world.tick(neck_pitch=-40.0, left_upper_lid=20.0)
-    assert world.angle(LEFT) == pytest.approx(20.0) and world.angle(PITCH) == pytest.approx(-40.0)
-    for _ in range(400):
-        world.tick(neck_pitch=0.0, left_upper_lid=20.0)
-    assert world.angle(PITCH) == pytest.approx(-31.0)
-    for _ in range(400):
-        world.tick(neck_pitch=0.0, left_upper_lid=-20.0)
-    assert world.angle(PITCH) == pytest.approx(0.0, abs=1e-6)
-    assert not world.crossed()
-
-
-@pytest.mark.parametrize("off", np.linspace(-0.3, 0.3, 13).tolist())
-def test_the_four_walls_are_swept_densely(off: float):
-    for pitch, lid in ((-17.0 + off, 20.0), (-31.0 + off, 20.0), (-24.0, 9.0 + off)):
-        world = PairWorld(LID, neck_pitch=-45.0 if pitch < -30.0 else 0.0).awake()
-        for _ in range(200):
-            world.tick(neck_pitch=pitch, left_upper_lid=0.0 if lid > 10.0 else lid)
-            if lid > 10.0:
-                world.tick(neck_pitch=-45.0 if pitch < -30.0 else 0.0, left_upper_lid=lid)
-        for _ in range(400):
-            world.tick(neck_pitch=pitch, left_upper_lid=lid)
-        apart = (
-            world.angle(PITCH) >= -17.0 - 1e-6
-            or world.angle(PITCH) <= -31.0 + 1e-6
-            or world.angle(LEFT) <= 9.0 + 1e-6
-        )
-        assert apart and not world.crossed()
-
-
-def test_the_other_joint_waits_until_the_first_is_measured_out():
-    world = PairWorld(LID, neck_pitch=-24.0, left_upper_lid=0.0).awake()
-    at_first = world.path[-1]
-    world.measured = lambda angles: (*angles[:PITCH], at_first[PITCH], *angles[PITCH + 1 :])
-    for _ in range(24):  # the neck lags: its command leaves, its head does not yet
-        world.tick(neck_pitch=0.0, left_upper_lid=20.0)
-    assert world.angle(PITCH) > -16.0 and world.angle(LEFT) <= 9.0 + 1e-9
-    world.measured = lambda angles: angles
-    for _ in range(100):
-        world.tick(neck_pitch=0.0, left_upper_lid=20.0)
-    assert world.angle(LEFT) == pytest.approx(20.0)
-
-
-def test_a_keeper_pushed_in_by_hand_keeps_the_other_out():
-    world = PairWorld(LID).awake()
-    world.measured = lambda angles: (*angles[:PITCH], radians(-20.0), *angles[PITCH + 1 :])
-    for _ in range(25):
-        world.tick(left_upper_lid=20.0)
-    assert world.angle(LEFT) <= 9.0 + 1e-9
 
 
 @pytest.mark.parametrize("pitch", [-29.9, -24.0, -18.1])
@@ -794,9 +539,8 @@ def test_who_begins_in_a_box_is_led_out_gently(pitch: float, lid: float):
     assert np.abs(speeds).max() <= 60.0 + 1e-6
     assert np.abs(np.diff(speeds, axis=0, prepend=0.0)).max() <= 301.0 * DT
     assert (np.ptp(path[: len(out)], axis=0) == 0.0).sum() == 1  # the other one waits
-    assert not touches(
-        path[-2:-1], path[-1:], np.array([-30.0, 10.0]), np.array([-18.0, 25.0])
-    ).any()
+    pitch, lid = path[-1]
+    assert not (-30.0 <= pitch <= -18.0 and 10.0 <= lid <= 25.0)
 
 
 def test_a_rearmed_joint_inside_a_box_is_led_out():
@@ -804,12 +548,15 @@ def test_a_rearmed_joint_inside_a_box_is_led_out():
     for _ in range(100):
         world.tick(left_upper_lid=20.0)
     world.t_s += DT
-    at = (*world.path[-1][:PITCH], radians(-24.0), *world.path[-1][PITCH + 1 :])
+    at = (*world.path[-1][:PITCH], radians(-19.0), *world.path[-1][PITCH + 1 :])
     again = tuple(k == PITCH for k in range(9))
     joints = joints_at(at, world.t_s, rearmed=again)
     verdict = world.guard.check(ZERO, joints, 0.0, world.t_s)
     assert reason_of(verdict, "neck_pitch") == "self-collision"
     world.path.append(verdict.command_rad)
+    for _ in range(10):  # the other one waits, whatever it is to do
+        world.tick(left_upper_lid=20.05)
+        assert world.angle(LEFT) == pytest.approx(20.0, abs=1e-9)
     for _ in range(400):
         verdict = world.tick(left_upper_lid=20.0)
     assert verdict.level == "ok"

@@ -23,24 +23,6 @@ def tracker() -> Tracker:
     return Tracker()
 
 
-def test_velocity_is_learned_and_the_lag_vanishes(tracker: Tracker):
-    for k in range(60):
-        t = k / 30
-        (track,) = tracker.step([face(1.0, 0.3 * t)], CAMERA, t)
-    assert track.v_world_m_s[1] == pytest.approx(0.3, abs=0.01)
-    assert track.p_world_m[1] == pytest.approx(0.3 * t, abs=0.003)
-
-
-def test_noise_in_distance_hardly_moves_the_place_across():
-    rng, tracker = np.random.default_rng(0), Tracker()
-    places = []
-    for k in range(200):
-        (track,) = tracker.step([face(1.0 + rng.normal(0, 0.08), 0.0)], CAMERA, k / 30)
-        places.append(track.p_world_m)
-    assert np.std([p[0] for p in places[30:]]) < 0.035
-    assert max(abs(p[1]) for p in places) < 1e-3
-
-
 def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity(tracker: Tracker):
     (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
     assert [track.id for track in tracker.step([], CAMERA, 0.1)] == [seen.id]
@@ -167,13 +149,6 @@ def test_a_sudden_step_is_followed_at_once_and_standing_stays_smooth():
             speeds.append(track.v_world_m_s[1])
     assert np.std(speeds) < 0.01
     assert max(lag) < 0.02
-
-
-def test_a_velocity_that_was_measured_is_taken_over_at_once():
-    blob = across(0.0, 2.0, "thing")
-    blob = blob._replace(v_m_s=(0.0, 1.0, 0.0), across_sd_m_s=0.05, along_sd_m_s=0.3)
-    (track,) = Tracker().step([blob], CAMERA, 0.0)
-    assert track.v_world_m_s == pytest.approx((0.0, 1.0, 0.0), abs=0.02)
 
 
 def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes(tracker: Tracker):
