@@ -51,6 +51,7 @@ SMART = """0.5 2
 0.6 9 pause 1
 0.6 2 brown-out {b}
 0.6 9 pause 1
+0.6 2 unplug for 0.015
 0.6 9 release
 0.6 9 narrow
 0.6 2 brown-out {a}
@@ -71,6 +72,7 @@ BOARD = """0.5 2
 0.6 30 brown-out
 0.6 20 unplug for 0.1
 0.6 20 pause 0.5
+0.6 2 unplug for 0.015
 0.6 9 release
 0.6 30 narrow
 0.6 8 lose-writes 2
