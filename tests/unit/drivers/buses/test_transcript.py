@@ -53,6 +53,8 @@ SMART = """0.5 2
 0.6 9 pause 1
 0.6 2 unplug for 0.015
 0.6 9 release
+0.6 0 unplug for 0.005
+0.6 30 hold
 0.6 9 narrow
 0.6 2 brown-out {a}
 0.6 2 brown-out {c}
@@ -74,6 +76,8 @@ BOARD = """0.5 2
 0.6 20 pause 0.5
 0.6 2 unplug for 0.015
 0.6 9 release
+0.6 0 unplug for 0.005
+0.6 30 hold
 0.6 30 narrow
 0.6 8 lose-writes 2
 0.6 2 release"""
