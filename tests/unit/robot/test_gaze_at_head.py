@@ -180,16 +180,6 @@ FACE = DetectedFace((290.0, 200.0, 80.0, 80.0), PIXELS, 0.9)
 OFF = replace(FACE, landmarks_px=3.0 * PIXELS)
 
 
-@pytest.mark.parametrize(
-    ("shift", "off"),
-    [((0, 0), False), ((-300, 0), False), ((-330, 0), True), ((0, 250), True), ((400, 0), True)],
-)
-def test_a_face_that_the_edge_cuts_is_one_while_its_middle_is_inside(
-    shift: tuple[float, float], off: bool
-):
-    assert is_off_frame(replace(FACE, landmarks_px=PIXELS + shift), 640, 480) is off
-
-
 def test_one_point_far_outside_is_no_face():
     points = PIXELS.copy()
     points[4] = (5000.0, 200.0)

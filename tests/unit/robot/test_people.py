@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from present import present
-from seen_people import HEIGHT, LENS, STILL, WIDTH, face_at
+from seen_people import LENS, STILL, face_at
 from seen_people import seen as percept_at
 from skimage.data import astronaut, cat
 
@@ -233,21 +233,6 @@ def at_30_hz(perception: Perception, first: int, count: int, **found: object) ->
         some = people if number % 15 == 1 else ()
         percept = percept_at(perception, number, people=some, **found)
     return percept
-
-
-@pytest.mark.parametrize("p_m", [(0.0, 0.0, 2.0), (-0.6, -0.3, 1.2), (0.9, 0.2, 4.0)])
-def test_a_person_who_is_turned_away_is_a_body_where_the_head_is_and_no_face(p_m: Vec3):
-    percept = at_30_hz(seeing(), 1, 30, people=(person_at(p_m),))
-    assert percept.faces == () and percept.bodies.kinds == ("face",)
-    (place,) = percept.bodies.p_world_m
-    assert place == pytest.approx((p_m[2], -p_m[0], -p_m[1]), abs=0.02)  # x ahead, y left, z up
-
-
-@pytest.mark.parametrize(("sd_m", "far_m"), [(0.02, 1.5), (0.5, 2.0)])
-def test_a_measured_depth_places_the_head(sd_m: float, far_m: float):
-    noise = np.random.default_rng(1).normal(1.4, sd_m, (HEIGHT, WIDTH))
-    percept = at_30_hz(seeing(), 1, 1, people=(person_at((0.0, 0.0, 2.0)),), depth_m=noise)
-    assert percept.bodies.p_world_m[0, 0] == pytest.approx(far_m, abs=0.01)
 
 
 def test_a_person_with_a_visible_face_is_not_there_twice():

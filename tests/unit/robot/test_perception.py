@@ -102,17 +102,6 @@ def test_who_walks_out_of_the_picture_is_no_longer_seen_but_remembered():
     assert set(seen(perception, 91, people=(body_at(1.3),)).bodies.ids) == ids
 
 
-def test_who_has_the_head_above_the_picture_is_where_the_body_is_seen():
-    perception = Perception(STILL, 69.0)
-    body = body_at(0.4)
-    above = replace(body, head_px=(body.head_px[0], -60.0))
-    for k in range(1, 12):
-        found = seen(perception, k, people=(above,) if k < 6 else ())
-        ((x, y, z),) = found.bodies.p_world_m
-        (pixel,) = project([(-y, -z, x)], LENS)
-        assert pixel == pytest.approx((body.head_px[0], 0.02 * WIDTH), abs=0.5)
-
-
 @pytest.mark.parametrize(("frames", "waited"), [(1, False), (2, True)])
 def test_a_body_that_is_found_once_is_not_waited_for_as_a_person_is(frames: int, waited: bool):
     perception = Perception(STILL, 69.0)
