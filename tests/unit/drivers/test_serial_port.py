@@ -72,6 +72,13 @@ def test_a_hang_up_is_a_lost_bus(line):
             use()
 
 
+def test_a_port_whose_path_is_gone_was_unplugged(line):
+    _, port = line
+    port.opened_as += "-gone"
+    with pytest.raises(BusLost, match=r"it was unplugged"):
+        port.read_until(1, port.now_s())
+
+
 def test_an_absent_port_is_named_with_the_ports_there_are(monkeypatch):
     class Found:
         device, description = "/dev/ttyACM7", "U2D2"

@@ -114,7 +114,11 @@ def transcript(name):
         return " ".join(map(str, feedback))
 
     port.write, port.read_until = noted_write, noted_read  # type: ignore[method-assign]
+    port.closePort = lambda: note("closed", "")  # type: ignore[method-assign]
     ids = dict(zip("abcd", (setup.id for setup in bench.setups), strict=True))
+    bench.command("lose all")
+    attempt(bus.open)
+    bench.command("clear")
     attempt(bus.open)
     yield "open", noted
     for line in (BOARD if name in BOARDS else SMART).splitlines():
