@@ -89,7 +89,7 @@ def test_a_punch_is_guarded_against_after_the_reaction_time_and_its_fist_is_name
 
 
 def test_a_punch_whose_speed_is_certain_is_guarded_against_at_once():
-    for sd_m_s, action in ((0.3, "guard"), (1.2, "wait")):
+    for sd_m_s, action in ((0.84, "guard"), (0.86, "wait")):
         one = punch(0.0)
         cov = np.array([np.eye(3) * sd_m_s**2] * len(one.bodies.ids))
         sure = structs.replace(one, bodies=structs.replace(one.bodies, v_cov=cov))

@@ -6,7 +6,7 @@ import numpy as np
 
 from gazerig.gaze import angles as a
 
-V, W = (2.0, 3.0, -5.0), (7.0, -11.0, 13.0)
+V = (2.0, 3.0, -5.0)
 M = ((2.0, 3.0, 5.0), (7.0, 11.0, 13.0), (17.0, 19.0, 23.0))
 AHEAD = (1.0, 0.0, 0.0)
 TURN = asin(0.8), asin(0.6), asin(12.0 / 13.0)
@@ -23,14 +23,11 @@ def same(found, expected):
 
 
 def test_vectors_angles_and_numbers():
-    same(a.cross(V, W), np.cross(V, W))
     same(a.unit((0.0, 0.0, 0.0)), AHEAD)
     same(a.perpendicular(V, (0.0, 0.6, 0.8)), (2.0, 3.0 + 2.2 * 0.6, -5.0 + 2.2 * 0.8))
     same([a.wrap(3.5 * pi), a.wrap(-1.0)], (-pi / 2, -1.0))
     same([a.clip(x, 2.0) for x in (-3.0, 1.5, 4.0)], (-2.0, 1.5, 2.0))
     same(a.direction(TURN[:2]), (0.48, 0.64, 0.6))
-    same(a.yaw_pitch((4.8, 6.4, 6.0)), TURN[:2])
-    same(a.angle_between(V, W), np.arccos(-84.0 / (38.0 * 339.0) ** 0.5))
 
 
 def test_a_point_is_moved_away_from_the_eye_only_if_it_is_too_near():

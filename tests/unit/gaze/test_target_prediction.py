@@ -1,12 +1,11 @@
 """Prediction of targets: along a curve, from a period, and what must not be taken for one."""
 
-from collections.abc import Callable
 from math import pi, sin
 
 import numpy as np
 import pytest
-from msgspec.structs import replace
 
+from gazerig.gaze.angles import add, dot, norm, scale
 from gazerig.gaze.oculomotor.target_prediction import TargetPrediction
 from gazerig.gaze.types import Target
 from gazerig.sim_mock.scenes.scene import min_jerk
@@ -15,29 +14,25 @@ EYE = (0.0, 0.0, 0.0)
 FRAME_S = 1.0 / 30.0
 FAST = 10.0
 AGE_S = 0.08
-Path = Callable[[float], float]
+PLACE, WAY = (1.0, 0.0, 0.2), (0.48, 0.64, 0.6)
 
 
-def at(y, v, t, name=1):
-    return Target((1.0, y, 0.2), (0.0, v, 0.0), t, "face", name, 0.5, False, None, 1, "")
+def at(y, v, t):
+    """Return a frame of a target that moves aslant, along all axes."""
+    p = add(PLACE, scale(WAY, y))
+    return Target(p, scale(WAY, v), t, "face", 1, 0.5, False, None, 1, "")
 
 
-def target(path, t, name=1):
+def target(path, t):
     d = 1e-4
-    return at(path(t), (path(t + d) - path(t - d)) / (2.0 * d), t, name)
+    return at(path(t), (path(t + d) - path(t - d)) / (2.0 * d), t)
 
 
-def shown(path, seconds, noise_m=0.0,
-          fastest=FAST):  # fmt: skip
+def shown(path, seconds, fastest=FAST):
     """Return a prediction that has seen a path for a time."""
-    rng = np.random.default_rng(0)
     prediction = TargetPrediction()
     for k in range(round(seconds / FRAME_S) + 1):
-        seen = target(path, k * FRAME_S)
-        x, y, z = seen.p_world_m
-        prediction.record_target(
-            replace(seen, p_world_m=(x, y + noise_m * float(rng.normal()), z)), EYE, fastest
-        )
+        prediction.record_target(target(path, k * FRAME_S), EYE, fastest)
     return prediction
 
 
@@ -46,7 +41,10 @@ def swing(hz, size=0.1):
 
 
 def y_of(moved):
-    return moved[1]
+    """Return a motion along the path, which is all of it."""
+    along = dot(moved, WAY)
+    assert moved == pytest.approx(scale(WAY, along), abs=1e-9)
+    return along
 
 
 @pytest.mark.parametrize("hz", [0.5, 0.7, 1.0, 1.5, 2.0])
@@ -60,7 +58,8 @@ def test_a_swing_is_recognised_after_one_to_two_cycles_and_predicted(hz):
             known_s = t
         if t > 2.0 / hz + 0.2:
             off.append(path(t) + y_of(prediction.displacement(t + AGE_S)) - path(t + AGE_S))
-    assert known_s is not None
+    assert known_s is not None and prediction.size_m == pytest.approx(0.1, rel=0.02)
+    assert prediction.to_middle == pytest.approx(scale(WAY, 0.3 - path(t)), abs=0.003)
     # A stretch is looked at every other to every sixth frame.
     assert 0.9 / hz < known_s < 2.0 / hz + 0.2
     assert np.abs(off).max() < 0.03 * 0.1
@@ -74,6 +73,18 @@ def test_a_steady_motion_is_extrapolated_with_its_velocity_and_fades():
     # 0.12 s with all of it, then with what a time constant of 0.3 s leaves.
     assert y_of(prediction.motion(end_s + 0.42)[1]) == pytest.approx(0.2 / np.e, rel=0.01)
     assert y_of(prediction.displacement(end_s + 9.0)) == pytest.approx(0.2 * 0.42, rel=0.01)
+
+
+def test_no_motion_is_extrapolated_faster_than_it_can_be_followed():
+    moved, speed = shown(lambda t: 0.2 * t, 2.0, 0.1).motion(2.1)
+    most_m_s = 0.1 * norm(add(PLACE, scale(WAY, 0.4)))
+    assert (y_of(moved), y_of(speed)) == pytest.approx((0.1 * most_m_s, most_m_s))
+    # A faster swing is followed with a smaller amplitude.
+    most_m_s = 0.3 * norm(add(PLACE, scale(WAY, 0.3)))
+    sways = shown(swing(1.0), 3.0, 0.3)
+    assert y_of(sways.motion(3.0)[1]) == pytest.approx(most_m_s, rel=0.01)
+    there = most_m_s / (2.0 * pi) * sin(0.2 * pi)
+    assert y_of(sways.displacement(3.1)) == pytest.approx(there, rel=0.01)
 
 
 def test_a_motion_that_slows_down_is_extrapolated_along_its_curve():
