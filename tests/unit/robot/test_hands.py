@@ -14,7 +14,7 @@ from text_table import rows
 from gazerig.config.schema import load_rig
 from gazerig.drivers.camera.shared_slots import PoseBuffer
 from gazerig.drivers.types import Located
-from gazerig.gaze.angles import angle_between, rotation, sub
+from gazerig.gaze.angles import add, angle_between, rotation, sub
 from gazerig.gaze.attention.persons import Persons
 from gazerig.gaze.types import Percept, Vec3
 from gazerig.robot.model.frames import CameraMount, PoseHistory
@@ -112,8 +112,14 @@ def level(p: Vec3) -> float:
 
 
 def kinds(hands: Hands, *seen: Located, faces: tuple[Known, ...] = (FACE,)) -> list[str]:
-    """Return what the patches of successive frames are called."""
-    return [hands.label([one], list(faces), EYE, k / 30)[0].kind for k, one in enumerate(seen)]
+    """Return what the patches of successive frames are called, by a camera that is elsewhere."""
+    there = (0.5, -0.25, 2.0)
+    people: list[Known] = [(add(p, there), v) for p, v in faces]
+    moved = [
+        one._replace(p_m=add(one.p_m, there), fastest_m=add(one.fastest_m or one.p_m, there))
+        for one in seen
+    ]
+    return [hands.label([one], people, there, k / 30)[0].kind for k, one in enumerate(moved)]
 
 
 ARMS = """

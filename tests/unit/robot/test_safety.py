@@ -410,6 +410,8 @@ def test_a_reset_begins_anew():
 
 
 def test_a_rearmed_joint_begins_where_it_is(world: ServoWorld):
+    gentle = [reason(world.tick(0.0, rearmed=k == 0)) for k in range(250)]
+    assert gentle.count("starting slowly") == pytest.approx(1.0 / DT, abs=1.1)
     for _ in range(40):
         world.tick(0.4)
     verdict = world.tick(0.4, stray=-0.25, rearmed=True)
