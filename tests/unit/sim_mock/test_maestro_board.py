@@ -7,7 +7,7 @@ from maestro_world import PROTOCOL, World, acceleration, speed, target
 
 from gazerig.sim_mock.hobby_servo import HobbySpec
 from gazerig.sim_mock.maestro.board import CRC, SIZES, crc7
-from gazerig.sim_mock.maestro.channel import EmulatedChannel
+from gazerig.sim_mock.maestro.channel import EmulatedChannel, largest_braking_step
 
 
 @pytest.fixture
@@ -82,6 +82,11 @@ def test_a_channel_keeps_its_limits_and_always_arrives(orders):
     for _ in range(800):
         channel.step()
     assert channel.position == channel.target and not channel.is_moving
+
+
+def test_the_first_step_of_a_motion_lets_the_others_shrink_by_the_acceleration():
+    ways = (10, 1), (9, 1), (20, 2), (5, 10)  # 4+3+2+1, 3+.., 8+6+4+2, 5
+    assert [largest_braking_step(*way) for way in ways] == [4, 3, 8, 5]
 
 
 # --- faults

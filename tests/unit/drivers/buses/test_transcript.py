@@ -34,6 +34,8 @@ SMART = """0.5 2
 0.6 5 temperature {a} 90
 0.6 60 temperature {a} 40
 0.6 9 turn {b} 300
+0.5 4 stick {d}
+0.6 4 free {d}
 0.6 20 unplug for 0.1
 0.6 30 pause 0.5
 0.6 2 brown-out {d}
@@ -71,6 +73,9 @@ BOARD = """0.5 2
 0.6 8 corrupt all 9 count 3
 0.6 8 truncate all 1 count 3
 0.6 8 delay all 25 count 3
+0.45 4 stick {b}
+0.6 4 free {b}
+0.6 4 turn {b} 100
 0.6 30 brown-out
 0.6 20 unplug for 0.1
 0.6 20 pause 0.5
@@ -111,7 +116,7 @@ def transcript(name):
     def tick():
         feedback = bus.read(bench.now_s())
         bus.write(goals)
-        return " ".join(map(str, feedback))
+        return f"{feedback} truly at {[round(place, 1) for place in bench.places()]}"
 
     port.write, port.read_until = noted_write, noted_read  # type: ignore[method-assign]
     port.closePort = lambda: note("closed", "")  # type: ignore[method-assign]
