@@ -122,32 +122,3 @@ def test_bring_up_of_a_coupled_neck(tmp_path: Path):
     once = invoked("monitor", rig, "--mock", "--once")
     row = next(line.split() for line in once.out.splitlines() if line.startswith("neck_pitch"))
     assert float(row[3]) == pytest.approx(-8.0, abs=0.2)
-
-
-def test_hobby_servos_of_a_coupled_neck_get_the_range_of_both_joints(
-    started: Callable[[Rig], Run],
-):
-    """Channels of a board are checked and armed for pitch and roll at once."""
-    rig = load_rig("maker")
-    joint = replace(
-        rig.joints["left_upper_lid"], transmission_points=(), min_deg=-30.0, max_deg=30.0
-    )
-    rig = replace(
-        rig,
-        joints={
-            **rig.joints,
-            "neck_pitch": replace(joint, id=10, sign=1),
-            "neck_roll": replace(joint, id=11, sign=1),
-        },
-        couplings={"neck": CouplingParams("neck_pitch", "neck_roll")},
-    )
-    assert faults(rig) == []
-    found = dict(zip(rig.names, servo_configs(rig), strict=True))
-    own = joint.setup("neck_pitch")
-    wide = found["neck_pitch"].max_steps - found["neck_pitch"].min_steps
-    assert wide == pytest.approx(2 * (own.max_steps - own.min_steps), abs=4)
-    made = started(rig)
-    made.robot.command(Jog((("neck_pitch", radians(10.0)), ("neck_roll", radians(8.0))), stay=True))
-    tick = ticks(made, 400)[-1]
-    at = dict(zip(rig.names, map(degrees, tick.joints.position_rad), strict=True))
-    assert (at["neck_pitch"], at["neck_roll"]) == pytest.approx((10.0, 8.0), abs=0.3)

@@ -87,7 +87,6 @@ def test_cues_and_ends_of_tracks_are_events(
     for _ in range(2):
         feed.update(made_tick(tracks=(other, now)))
     assert [event.text for event in feed.events()] == found
-    assert {e.subject for e in feed.events()} <= {"a", "b", "c", "nod"}
 
 
 def test_people_and_messages_are_events():
@@ -112,4 +111,4 @@ def test_people_and_messages_are_events():
     ]
     assert feed.messages() == feed.events()[2:3] == feed.report(2).events[:1]
     assert follower.call_count == 2 and feed.report(6).number == 6
-    assert feed.wait_for_ticks(0, 0.0) and not feed.wait_for_ticks(1, 0.004)
+    assert not feed.wait_for_ticks(1, 0.004)
