@@ -72,25 +72,6 @@ def assert_true(found: LensCalibration, true: Intrinsics) -> None:
     assert (lens.cx_px, lens.cy_px) == pytest.approx((true.cx_px, true.cy_px), abs=slack)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_lens_from_pictures_is_within_one_percent(seed: int):
-    rng = np.random.default_rng(seed)
-    camera = BoardScene(CAMERA, BOARD, KINEMATICS)
-    views = []
-    for number in range(24):
-        pose = hand_held_pose(number + 5 * seed, BOARD)
-        seen = BOARD.find(camera.image(pose))
-        assert seen is not None
-        # 0.3 px on top of what the drawn pictures' own noise does.
-        views.append(
-            seen._replace(corners_px=seen.corners_px + rng.normal(0, 0.3, (len(seen[0]), 2)))
-        )
-    found = calibrated(views)
-    assert_true(found, BOARD_LENS)
-    assert found.rms_px == pytest.approx(0.3 * 2**0.5, rel=0.2)
-    assert found.dropped == 0
-
-
 def test_a_view_that_does_not_fit_is_dropped():
     views = some_views()
     rng = np.random.default_rng(9)
@@ -128,16 +109,10 @@ def test_views_that_do_not_show_the_lens_are_not_enough(
     assert re.search(missing, collector.missing)
 
 
-def test_views_that_show_the_lens_are_enough_and_each_is_a_new_one():
-    collector = ViewCollector(GUESS, *SIZE)
-    views = some_views(count=60)
-    assert collector.offer(None) == "no board seen"
-    assert [collector.offer(view) for view in (views[0], views[0])] == [
-        "", "too much like a view before",
-    ]  # fmt: skip
-    for view in views:
-        collector.offer(view)
-    assert collector.missing == "" and 12 <= len(collector.views) < len(views)
+def test_each_view_is_a_new_one():
+    collector, (view,) = ViewCollector(GUESS, *SIZE), some_views(count=1)
+    answers = [collector.offer(one) for one in (None, view, view)]
+    assert answers == ["no board seen", "", "too much like a view before"]
 
 
 def test_corners_that_jump_about_are_refused_with_the_number():

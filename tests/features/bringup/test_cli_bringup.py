@@ -15,7 +15,9 @@ from served_rigs import served
 from gazerig.config.schema import load_rig
 from gazerig.drivers.serial.list_ports import SerialPort
 from gazerig.features.bringup.cli import ports
+from gazerig.features.bringup.cli.calibrate import camera
 from gazerig.features.bringup.manual_control import ManualControl
+from gazerig.robot.model.clock import SimulatedClock
 from gazerig.sim_mock.devices import MaestroLine
 
 pytestmark = pytest.mark.usefixtures("simulated_wires", "no_real_ports")
@@ -209,11 +211,14 @@ def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_pa
     assert "joints.left_eye_pan.zero_step" in done.err
 
 
-def test_a_jaw_is_calibrated_by_hand(tmp_path: Path):
-    answers = answers_in(tmp_path, "turn 300", "", "turn -500", "", "", "y")
-    done = calibrated("expressive", "--mock", "--dry-run", "--joint", "jaw", "--answers", answers)
-    assert "turn jaw to its POSITIVE end" in done.out + done.err
-    assert "joints.jaw.zero_step" in done.out + done.err, done
+def test_a_lens_is_measured_and_written(rig: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(camera, "RealClock", SimulatedClock)
+    done = calibrated("camera", str(rig), "--mock", "--what", "lens", "--yes")
+    lens = load_rig(str(rig)).camera.lens
+    assert lens is not None
+    assert lens.focal_px == pytest.approx((480.0, 482.0), rel=0.01)  # BOARD_LENS
+    assert lens.centre_px == pytest.approx((327.0, 190.0), abs=6.4)
+    assert "lens: 13 views, 0 dropped, reprojection error 0.1" in done.err
 
 
 # --- on a port that another program serves, from a process of its own

@@ -22,10 +22,13 @@ from gazerig.features.bringup.calibration.hobby_calibration import (
     calibrate_by_marks,
 )
 from gazerig.features.bringup.calibration.joint_calibration import (
+    Calibration,
     CalibrationRefused,
     Marks,
     PositionUnwrapper,
+    centre_zero,
     joint_calibration,
+    rig_changes,
 )
 from gazerig.features.bringup.calibration.joint_procedure import calibrate_by_hand
 from gazerig.features.bringup.calibration.smart_servo_access import (
@@ -191,6 +194,16 @@ def test_marks_are_a_calibration_or_refused_with_the_reason(row: str):
     else:
         with pytest.raises(CalibrationRefused, match=re.escape(due)):
             joint_calibration(name, marks, joint, margin)
+
+
+def test_what_depends_on_a_range_follows_it():
+    name, made = "left_upper_lid", Calibration(2048, 1, -30.0, 12.0)
+    joint = replace(EYE, zero_step=2048, max_deg=12.0)
+    for park, moved in ((-31.0, -30.0), (13.0, 12.0), (5.0, None)):
+        found = rig_changes(name, joint, made, {name: park})
+        assert found.pop(f"park_deg.{name}", None) == moved
+        assert found == {f"joints.{name}.min_deg": -30.0, "lid_joints.left_deg": (-30.0, 12.0)}
+    assert centre_zero(Marks(1001, 2000, 7)).zero == 1500
 
 
 # --- Calibrating one emulated joint by hand or by motion; refused joints
