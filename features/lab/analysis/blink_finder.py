@@ -54,11 +54,6 @@ class BlinkEvent(NamedTuple):
     close_peak_1_s: float
     open_peak_1_s: float
 
-    @property
-    def duration_s(self) -> float:
-        """Return the total duration."""
-        return self.close_s + self.hold_s + self.open_s
-
 
 UPPER = ("left_upper_lid", "right_upper_lid")
 
