@@ -172,7 +172,8 @@ def test_servo_packets_are_never_sent_to_a_board_of_pololu(monkeypatch):
             code, _, err = invoked(*words)
             assert code == 2 and "board of Pololu" in err and "would move" in err, words
         code, out, _ = invoked("scan", "--port", path)
-        assert code == 0 and "12 channels" in out
+        told = f"Pololu Maestro: 12 channels, CRC on\n{path}: pulses: none (channels 0..5)\n"
+        assert code == 0 and told in out
         bus.command("lose all")
         code, out, _ = invoked("scan", "--port", path)
         assert code == 1 and "no servo answers" in out

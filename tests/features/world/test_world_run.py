@@ -131,14 +131,36 @@ def hands(scene: WorldScene, orders: Callable[[float], Vec3 | None] = path) -> n
     return np.array(found)
 
 
+MOVED = """
+99 6843 -158 189 8203 1818 189 9176 34 2132
+110 6849 -150 195 8209 1824 189 9187 38 2132
+150 6904 47 642 8240 1924 189 9202 148 2141
+205 6866 56 675 8260 2009 189 9219 233 2141
+215 4915 96 759 8216 2015 189 9176 239 2141
+245 3128 30 717 7601 2025 189 8561 249 2141
+305 6886 56 631 7435 2031 189 8395 255 2141
+320 6869 123 -1846 7588 1984 -1852 8626 256 2141
+390 6715 276 -3128 7895 1886 -3134 9144 256 2141
+430 6905 56 325 8243 2032 189 9202 256 2141
+500 6905 56 667 8263 2032 189 9223 256 2141
+560 6905 56 667 8265 2032 189 9225 256 2141
+640 6886 -1616 -2564 8909 3750 -2565 9429 86 2154
+690 6869 -1853 -2893 8981 3931 -2893 9412 35 2157
+"""
+"""Times in hundredths of a second; x, y, z of the left hand, the right one and the face in .1 mm.
+
+Pinned, not derived: pin anew in the commit that moves a boxer otherwise on purpose.
+"""
+
+
 def test_the_fist_follows_within_its_limits(scene: WorldScene):
     at = hands(scene)
-    m_s = np.linalg.norm(np.diff(at, axis=0), axis=2) / 0.01
-    assert m_s.max(axis=0) == pytest.approx([2.65, 2.5, 0.25], abs=0.2) and m_s.max() < MAX_M_S
+    assert np.linalg.norm(np.diff(at, axis=0), axis=2).max() < 0.01 * MAX_M_S
     # The front fist is at its ordered place; a low one takes the other hand along.
     assert at[245, 0] == pytest.approx(HIT, abs=0.05)
-    assert at[390, 0] == pytest.approx(LOW, abs=0.06)
-    assert at[390, 1, 2] < -0.25 < at[240, 1, 2]
+    for row in MOVED.strip().splitlines():
+        k, *places = map(int, row.split())
+        assert np.abs(1e4 * at[k].ravel() - places).max() < 1.0, row
 
 
 def test_the_fist_keeps_its_acceleration_where_its_order_jumps():
