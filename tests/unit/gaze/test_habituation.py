@@ -7,24 +7,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from attention_scene import NO_STAYS, attention, looking
+from attention_scene import NO_STAYS, attention, body, looking, percept
 
 from gazerig.gaze.attention.habituation import Habituation, HabituationParams
-from gazerig.gaze.types import Bodies, Percept
+from gazerig.gaze.types import Percept
 
 EYE = (0.0, 0.0, 0.0)
 PARAMS = HabituationParams()
 RATE_HZ = 15
 
 
-def bodies(kinds, *places, speed=0.0):
-    n = len(places)
-    v = np.zeros((n, 3))
-    v[:, 1] = speed
-    return Bodies(
-        tuple(range(1, n + 1)), tuple(kinds.split()), np.array(places, float).reshape(n, 3), v,
-        np.zeros((n, 3)), np.full(n, 0.1),
-    )  # fmt: skip
+def bodies(kinds, *places):
+    rows = zip(kinds.split(), places, strict=True)
+    return percept(0.0, *(body(k, *row) for k, row in enumerate(rows, 1))).bodies
 
 
 def arc(*away_m):
