@@ -304,7 +304,6 @@ def test_a_session_with_a_live_head(tmp_path: Path, program: Start):
     assert again.process.wait(30) == 0
 
 
-@pytest.mark.browser
 def test_a_session_in_chromium_with_the_keyboard(study: Path, program: Start):
     one = program(str(study))
     with browsing() as tab:
