@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from gazerig.drivers.camera.depth_roi import depth_at, resize_depth
+from gazerig.drivers.camera.depth_roi import depth_at, resize_depth, to_metres, to_millimetres
 
 BOX = (20.0, 10.0, 40.0, 40.0)
 
@@ -48,6 +48,13 @@ def test_whatever_the_picture_the_answer_is_a_distance_in_it_or_none(depth, box)
         assert low <= found.distance_m <= high
     assert 0.0 <= found.valid_share <= 1.0
     assert np.isfinite(found.spread_m)
+
+
+def test_millimetres_are_whole_and_0_is_unknown():
+    metres = np.array([np.nan, -1.0, 0.0004, 0.001, 1.2346, 65.535, 65.536, np.inf], np.float32)
+    found = to_millimetres(metres)
+    assert found.tolist() == [0, 0, 0, 1, 1235, 65535, 0, 0]
+    assert to_metres(found)[2:5] == pytest.approx([np.nan, 0.001, 1.235], nan_ok=True)
 
 
 def test_resizing_invents_no_distance():
