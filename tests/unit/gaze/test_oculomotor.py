@@ -30,7 +30,12 @@ from gazerig.gaze.angles import (
     unit,
 )
 from gazerig.gaze.field_of_view import line_of_sight
-from gazerig.gaze.oculomotor.binocular import BinocularController, EyeGeometry, OppositeAngles
+from gazerig.gaze.oculomotor.binocular import (
+    BinocularController,
+    EyeGeometry,
+    MeanGaze,
+    OppositeAngles,
+)
 from gazerig.gaze.oculomotor.gaze_point import OculomotorParams, Refixations, endpoint
 from gazerig.gaze.oculomotor.head import HeadParams, HeadShare
 from gazerig.gaze.oculomotor.saccade import SaccadeModel, SaccadeParams
@@ -269,10 +274,6 @@ HALF_M = CENTRED.interocular_mm / 2e3
 FAR_M = 10.0
 
 
-def mitake():
-    return load_rig("desk", profile="mitake").gaze
-
-
 class NoSaccades:
     is_saccade_due = is_correction_due = False
 
@@ -280,8 +281,8 @@ class NoSaccades:
 class Alone:
     """Eyes that the controller moves without any saccade, on a head that is held."""
 
-    def __init__(self, geometry=CENTRED):
-        self.kinematics = Rig(geometry=geometry).kinematics
+    def __init__(self):
+        self.kinematics = Rig().kinematics
         self._controller, self._gaze = BinocularController(), (1.0, 0.0, 0.0)
 
     def tick(self, target, head_rad, t, dt):
@@ -317,13 +318,12 @@ def eyes(
     dt=DT,
     begin=None,
     turning=None,
-    geometry=CENTRED,
 ):
     """Let the eyes follow; they begin at rest on ``begin`` or the first target.
 
     turning: yaw of the head in radians, which is held by hand
     """
-    alone, rows = Alone(geometry), []
+    alone, rows = Alone(), []
     first = begin if begin is not None else structs.replace(where(0.0), v_world_m_s=(0.0, 0.0, 0.0))
     settle = round(4.0 / dt)
     for k in range(-settle, round(seconds / dt)):
@@ -336,43 +336,28 @@ def eyes(
     return Followed(*np.array(rows).T)
 
 
-def ramp_numbers(speed, dt):
-    """Return onset, time to 90 %, steady gain, lag in seconds."""
-    start = -0.6 * speed
-    trace = eyes(lambda t: aim(start + speed * t, speed, t=t), 1.2, dt)
-    trace = trace._replace(version=trace.version - start)
-    speeds = np.diff(trace.version, prepend=0.0) / dt
-    starts = trace.t - dt
-    onset = starts[np.argmax(speeds > 0.05 * speed)]
-    t90 = starts[np.argmax(speeds > 0.9 * speed)]
-    lag = trace.t[-1] - trace.version[-1] / speed
-    return float(onset), float(t90), float(speeds[-1] / speed), float(lag)
-
-
-def sine_numbers(hz, dt):
-    """Return gain and phase in degrees of +-5 deg, over the last whole cycles."""
-    w = 2.0 * pi * hz
-    cycles = 2 if hz < 0.3 else 4
-    trace = eyes(lambda t: aim(5.0 * sin(w * t), 5.0 * w * cos(w * t), t=t), cycles / hz, dt)
-    keep = trace.t > trace.t[-1] - cycles / 2 / hz + 1e-9
-    z = 2j * np.mean(trace.version[keep] * np.exp(-1j * w * trace.t[keep])) / 5.0
-    return abs(z), degrees(np.angle(z))
-
-
 @pytest.mark.parametrize("speed", [10.0, 20.0, 30.0])
 def test_e20_ramp(speed):
-    onset, t90, gain, lag = ramp_numbers(speed, DT)
-    assert onset == pytest.approx(0.105, abs=0.01)
-    assert t90 == pytest.approx(0.195, abs=0.02)
-    assert gain == pytest.approx(1.0, abs=0.02)
-    assert lag == pytest.approx(0.1415, rel=0.08)
+    start = -0.6 * speed
+    trace = eyes(lambda t: aim(start + speed * t, speed, t=t), 1.2)
+    done, starts = trace.version - start, trace.t - DT
+    speeds = np.diff(done, prepend=0.0) / DT
+    assert starts[np.argmax(speeds > 0.05 * speed)] == pytest.approx(0.105, abs=0.01)
+    assert starts[np.argmax(speeds > 0.9 * speed)] == pytest.approx(0.195, abs=0.02)
+    assert speeds[-1] / speed == pytest.approx(1.0, abs=0.02)
+    assert trace.t[-1] - done[-1] / speed == pytest.approx(0.1415, rel=0.08)
 
 
 @pytest.mark.parametrize("hz", [0.1, 0.2, 0.3, 0.4, 0.5])
 def test_e21_sine(hz):
-    gain, phase = sine_numbers(hz, DT)
-    assert 0.98 <= gain <= 1.01
-    assert phase == pytest.approx(-360.0 * hz * 0.140, abs=3.0)
+    """Gain and phase of +-5 deg, over the last whole cycles."""
+    w = 2.0 * pi * hz
+    cycles = 2 if hz < 0.3 else 4
+    trace = eyes(lambda t: aim(5.0 * sin(w * t), 5.0 * w * cos(w * t), t=t), cycles / hz)
+    keep = trace.t > trace.t[-1] - cycles / 2 / hz + 1e-9
+    z = 2j * np.mean(trace.version[keep] * np.exp(-1j * w * trace.t[keep])) / 5.0
+    assert 0.98 <= abs(z) <= 1.01
+    assert degrees(np.angle(z)) == pytest.approx(-360.0 * hz * 0.140, abs=3.0)
 
 
 def test_a_step_of_the_target_is_no_velocity():
@@ -401,24 +386,18 @@ def test_e25_vergence_step(start, step, t63, gain):
     assert np.abs(trace.version).max() < 0.01
 
 
-def reflex(hz, dt, held_ticks):
-    """Return gain and phase of the eyes in a head that swings by 10 deg in the dark.
+@pytest.mark.parametrize(("hz", "phase", "residual"), [(0.5, -1.9, 0.033), (2.0, -7.6, 0.132)])
+def test_e29_reflex_without_a_target(hz, phase, residual):
+    """Gain and phase of the eyes in a head that swings by 10 deg in the dark.
 
-    held_ticks: share of a tick by which an angle counts before the tick's end
+    The command of tick k follows from the head at tick k and holds at its end.
     """
     w = 2.0 * pi * hz
     begin = aim(0.0, 0.0, 100.0, -4.0)
     lost = structs.replace(begin, v_world_m_s=(0.0, 1e-9, 0.0), at_s=0.0)
-    trace = eyes(lambda t: lost, 4.0 / hz, dt, begin, lambda t: radians(10.0) * sin(w * t))
+    trace = eyes(lambda t: lost, 4.0 / hz, 0.001, begin, lambda t: radians(10.0) * sin(w * t))
     keep = trace.t > 2.0 / hz
-    at_s = trace.t[keep] - held_ticks * dt
-    return complex(2j * np.mean(-trace.version[keep] * np.exp(-1j * w * at_s)) / 10.0)
-
-
-@pytest.mark.parametrize(("hz", "phase", "residual"), [(0.5, -1.9, 0.033), (2.0, -7.6, 0.132)])
-def test_e29_reflex_without_a_target(hz, phase, residual):
-    # The command of tick k follows from the head at tick k and holds at its end.
-    z = reflex(hz, 0.001, 0.0)
+    z = complex(2j * np.mean(-trace.version[keep] * np.exp(-1j * w * trace.t[keep])) / 10.0)
     assert abs(z) == pytest.approx(1.0, abs=0.02)
     assert degrees(np.angle(z)) == pytest.approx(phase, abs=2.0)
     assert abs(1.0 - z) == pytest.approx(residual, abs=0.02)
@@ -442,16 +421,23 @@ def test_e58_a_lost_target_fades():
     assert after(1.5) < 0.5
 
 
+def test_both_lines_of_sight_meet_where_the_vergence_has_them():
+    controller = BinocularController()
+    for apart_rad, vergence_rad, meets_m in (
+        (0.03, 0.06, 1.0), (0.03, 0.2, tan(0.03) / tan(0.1)), (0.03, 0.0, 100.0),
+        (0.03, 1e-6, 100.0), (0.0, 0.2, 7.0),
+    ):  # fmt: skip
+        controller.version = MeanGaze((1.0, 0.0, 0.0), vergence_rad)
+        one_m = (-apart_rad, 0.0), (apart_rad, 0.0)
+        assert controller.distance_m(one_m, 7.0) == pytest.approx(meets_m)
+
+
 # ---- The eyes of Nakamoto & Tsuruno 3.4, which the profile nakamoto runs.
 
 
 POINT = (1.0, 0.0, 0.125)
 TARGET = Target(POINT, (0.0, 0.0, 0.0), 0.0, "face", 1, 0.5, True, "N", 1, "a face")
 LIMIT_RAD = radians(20.0)
-
-
-class Saccades:
-    is_saccade_due = is_correction_due = False
 
 
 def in_range(eyes):
@@ -467,7 +453,7 @@ def view(head_deg):
 
 
 def stand(model, head_deg, gaze=POINT):
-    return model.fixate(TARGET, gaze, None, Saccades(), view(head_deg), 0.0, 0.005)
+    return model.fixate(TARGET, gaze, None, NoSaccades(), view(head_deg), 0.0, 0.005)
 
 
 def off_deg(gaze, head_deg):
