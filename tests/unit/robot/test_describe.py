@@ -58,21 +58,6 @@ def test_all_files_are_read_by_others(written: Path):
     assert sum(path.stat().st_size for path in written.rglob("*") if path.is_file()) < 8e6
 
 
-def test_joints_of_a_urdf_have_limits_and_followers():
-    import yourdfpy
-
-    rig = shipped("minimal")
-    text = urdf(description_of(rig)).xml.encode()
-    robot = yourdfpy.URDF.load(io.BytesIO(text), load_meshes=False)
-    joint = robot.joint_map["eyes_pan"]
-    assert np.degrees([joint.limit.lower, joint.limit.upper, joint.limit.velocity]) == (
-        pytest.approx([-35.0, 35.0, 600.0])
-    )
-    assert joint.limit.effort == pytest.approx(0.215, rel=0.2)  # an XL330-M077 at 5 V
-    assert robot.joint_map["right_eyes_pan"].mimic.joint == "eyes_pan"
-    assert robot.actuated_joint_names == ["eyes_pan", "eyes_tilt"]
-
-
 def _tree(data: bytes) -> dict[str, Any]:
     size, kind = struct.unpack("<I4s", data[12:20])
     assert data[:4] == b"glTF" and kind == b"JSON"
