@@ -83,13 +83,18 @@ def test_a_rule_keeps_its_floor_of_interest():
     assert model.share({2: 0.5}, 2, 9.0) == {2: 1.0}  # one alone is not left for habituation
 
 
-@pytest.mark.parametrize(("drawn", "stay_s"), [(-99.0, 0.0), (0.0, 1.28), (99.0, 6.0)])
-def test_a_look_lasts_longer_by_a_draw_and_by_six_seconds_at_most(drawn, stay_s):
+@pytest.mark.parametrize(
+    ("drawn", "people", "stay_s"),
+    [(-99.0, 2, 0.0), (0.0, 3, 1.28), (99.0, 2, 6.0), (99.0, 4, 0.0)],
+)
+def test_a_look_lasts_longer_by_a_draw_and_by_six_seconds_at_most(drawn, people, stay_s):
     rng: Any = SimpleNamespace(standard_normal=lambda: drawn)
     model = Habituation(PARAMS, rng)
     model.start_stay(1)
     looks = (k / 30 for k in range(400))
-    lasts_s = next(t_s for t_s in looks if model.share({1: 1.0, 2: 1.0}, 1, t_s)[1] < 1.0)
+    lasts_s = next(
+        t_s for t_s in looks if model.share(dict.fromkeys(range(people), 1.0), 1, t_s)[1] < 1.0
+    )
     # What has been seen fades within 10 s.
     assert lasts_s == pytest.approx(-10.0 * log(1.0 - 0.1 * (0.6 + stay_s)), abs=0.04)
 
