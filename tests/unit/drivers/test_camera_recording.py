@@ -170,7 +170,9 @@ def test_a_run_records_the_frames_of_its_camera_and_never_over_a_file(tmp_path):
         loop.close()
         for k, found in enumerate(frames_of(path)):
             assert_same(found, shot(k))
-        assert len(frames_of(path)) == len(TIMES_S)
+        replay = CameraReplay(path)
+        assert len([*replay.play_once()]) == len(TIMES_S)
+        assert replay.events() == ()  # it was closed
     assert set(events) == {"something of the source"}
     with pytest.raises(SetupError, match="--oak or --camera"):
         RunOptions(mock=True, record_camera=tmp_path / "x.mcap").check_and_complete()
