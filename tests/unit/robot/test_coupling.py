@@ -20,7 +20,6 @@ from gazerig.robot.loop.body import CoupledServos
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.weight import HeadMassParams, MassParams
-from gazerig.robot.run.rig_limits import servo_configs
 from gazerig.robot.run.run import Run
 
 PITCH, ROLL = 35.0, 25.0

@@ -81,16 +81,18 @@ def test_a_frame_comes_with_what_it_shows_located():
     assert FrameAnalyzer(OneFace()).analyze(shot(3)).located is None
 
 
-@pytest.mark.parametrize(
-    ("height_px", "area_px", "compact"),
-    [(48.0, 1800.0, True), (30.0, 1200.0, False), (48.0, 1200.0, False), (0.0, 0.0, False)],
-)
+COMPACT = """
+48 1800 1, 43.6 1400 1, 43.4 1400 0, 57.4 1800 1, 57.5 1800 0, 48 1441 1, 48 1439 0, 0 0 0
+"""
+
+
+@pytest.mark.parametrize(("height_px", "area_px", "compact"), rows(COMPACT.replace(",", "\n")))
 def test_a_patch_as_wide_as_high_that_fills_its_box_is_compact(
-    height_px: float, area_px: float, compact: bool
+    height_px: float, area_px: float, compact: float
 ):
     patch = replace(BALL, box_px=(9.0, 9.0, 50.0, height_px), area_px=area_px)
     (thing,) = LOCATOR(picture(1, blobs=(patch,))).things
-    assert thing.compact is compact
+    assert thing.compact == bool(compact)
 
 
 PARTS = """
