@@ -104,8 +104,10 @@ def closure(since_onset_s: float, close_s: float, hold_s: float, open_s: float) 
         return 0.0
     if since_onset_s < close_s:
         return min_jerk(since_onset_s / close_s)
+    if since_onset_s < close_s + hold_s:
+        return 1.0
     # Opening starts quickly and ends in a long tail: minimum jerk in a time that runs fast at
-    # first. Before it, while the lid is held, that time is below 0 and minimum jerk is 0.
+    # first.
     s = (since_onset_s - close_s - hold_s) / open_s
     # Just before its end the polynomial exceeds 1 by a rounding error.
     return max(0.0, 1.0 - min_jerk(1.0 - (1.0 - s) ** 1.4))

@@ -6,7 +6,7 @@ joint's position, waits, and tries again softly.
 """
 
 from collections.abc import Sequence
-from math import inf, isfinite, nan, radians
+from math import isfinite, nan, radians
 from typing import Literal
 
 from gazerig.robot.model.joint import JointLimit
@@ -84,7 +84,7 @@ class JointHealth:
         heat = self._heat(i, _joint_value(joints.temperature_c, i))
         load = self._load(i, _joint_value(joints.load, i), dt_s)
         volts = self._volts(i, _joint_value(joints.voltage_v, i), dt_s)
-        share = min(1.0, heat, load, volts)
+        share = min(heat, load, volts)
         self.share[i] = _SLOWEST + (1.0 - _SLOWEST) * share
         if share == 1.0:
             self.why[i] = ""
@@ -96,16 +96,16 @@ class JointHealth:
             self.held[i] = "hot" if self._hot[i] else "voltage" if self._no_volts[i] else ""
 
     def _heat(self, i: int, celsius: float | None) -> float:
-        """Return the speed share allowed by heat, from 1 or more when warm to 0 when hot."""
+        """Return the speed share allowed by heat, from 1 when warm to 0 when hot."""
         if celsius is None:
-            return inf
+            return 1.0
         warm = self._limits[i].hottest_c - WARM_C
         hot = self._limits[i].hottest_c - HOT_C
         self._hot[i] = celsius >= (hot - _COOLER_C if self._hot[i] else hot)
-        return max((hot - celsius) / (hot - warm), 0.0)
+        return min(max((hot - celsius) / (hot - warm), 0.0), 1.0)
 
     def _load(self, i: int, load: float | None, dt_s: float) -> float:
-        """Return the speed share allowed by load, 1 at half the motor's heat limit and 0 at it.
+        """Return the speed share allowed by load, from 1 at half the motor's heat limit to 0 at it.
 
         Heat rises with the square of the current. It is dissipated at the rate at which the
         continuous load produces it.
@@ -115,19 +115,19 @@ class JointHealth:
             self._heated[i] = min(max(self._heated[i] + gained, 0.0), _FULL_S)
         filled = self._heated[i] / _FULL_S
         self._overloaded[i] = filled >= (0.5 if self._overloaded[i] else 1.0)
-        return 2.0 - 2.0 * filled
+        return min(max(2.0 - 2.0 * filled, 0.0), 1.0)
 
     def _volts(self, i: int, volts: float | None, dt_s: float) -> float:
-        """Return the speed share allowed by voltage, 1 at the margin and 0 at the limit."""
+        """Return the speed share allowed by voltage, from 1 inside the margin to 0 at the limit."""
         if volts is None:
-            return inf
+            return 1.0
         room = min(volts - self._limits[i].lowest_v, self._limits[i].highest_v - volts)
         outside_s = self._outside_s[i] + (dt_s if room < 0.0 else -dt_s)
         self._outside_s[i] = min(max(outside_s, 0.0), _OUTSIDE_S)
         # A sagging supply recovers when the joint stops: the joint rests for the same time.
-        spent = outside_s >= _OUTSIDE_S
+        spent = outside_s >= _OUTSIDE_S and room < 0.0
         self._no_volts[i] = spent or (self._no_volts[i] and self._outside_s[i] > 0.0)
-        return max(room / VOLTAGE_MARGIN_V, 0.0)
+        return min(max(room / VOLTAGE_MARGIN_V, 0.0), 1.0)
 
 
 def _joint_value(column: Sequence[float | None], i: int) -> float | None:

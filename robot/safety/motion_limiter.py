@@ -52,7 +52,7 @@ class MotionLimiter:
             left = abs(speed) - limit.accel_rad_s2 * for_s
             if not (short and self._slow[i]):
                 self._lost[i] = 0.0
-            elif abs(speed) > abs(lost):
+            elif lost * speed < 0.0 or abs(speed) > abs(lost):
                 self._lost[i] = speed
             self.speed[i] = copysign(left, speed) if left > 0.0 else 0.0
             self.goal[i] = self.command[i]
@@ -167,6 +167,7 @@ class MotionLimiter:
         limit = self.limits[i]
         self._step(i, 0.0, dt_s, limit.speed_rad_s, limit.accel_rad_s2)
         self.goal[i] = self.command[i]
+        self._lost[i] = 0.0
 
     def _step(
         self, i: int, wanted: float, dt_s: float, top: float, soft: float, regain: float = 0.0
@@ -186,11 +187,11 @@ class MotionLimiter:
         chosen = most if wanted > most else least if wanted < least else wanted
         # Top speed, range and braking distance override ``soft``, never the joint's own
         # acceleration, which suffices for them because every step is made here.
-        if chosen > 0.0:
+        if chosen > 0.0 or v > 0.0:
             up = min(top, reachable_speed(high - p, accel, dt_s))
             if chosen > up:
                 chosen = max(up, v - accel * dt_s)
-        if chosen < 0.0:
+        if chosen < 0.0 or v < 0.0:
             down = -min(top, reachable_speed(p - low, accel, dt_s))
             if chosen < down:
                 chosen = min(down, v + accel * dt_s)
@@ -319,6 +320,9 @@ class LateTicks:
             soft_s: Duration of the limited acceleration after a late tick.
         """
         recent_s = self._recent_s
+        if since_s <= LATE_PERIODS * self.period_s:
+            recent_s.append(since_s)
+            return since_s, 0.0
         pace_s = max(self.period_s, min(SLOWEST_S, *recent_s))
         recent_s.append(since_s)
         if since_s <= LATE_PERIODS * pace_s:

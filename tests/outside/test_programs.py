@@ -402,7 +402,6 @@ def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig: Rig):
 # Examples
 
 
-@pytest.mark.browser
 def test_the_browser_example_shows_the_head_and_commands_it(rig: Rig):
     file = ROOT / "examples" / "browser.html"
     assert len(file.read_text(encoding="utf-8").splitlines()) <= 100
