@@ -351,4 +351,3 @@ def test_a_face_has_the_velocity_of_its_track():
     for away, v in ((0.24, moves), (0.26, None)):
         tracked: list[Known] = [((2.0, 1.0, 0.0), EYE), ((2.0, 0.0, away), moves)]
         assert known_faces([face], tracked) == [(face.p_m, v), *tracked]
-    assert known_faces([face], []) == [(face.p_m, None)]
