@@ -74,7 +74,7 @@ def irises(tab: Browser) -> np.ndarray | None:
     return seen if len(seen) > 30 else None
 
 
-def test_the_page_shows_a_head_that_turns_and_asks_no_other_site(at_the_rig: tuple[Rig, Person]):
+def test_the_page_shows_a_head_that_turns_and_asks_no_other_site(at_the_rig):
     rig, person = at_the_rig
     loading = "document.querySelector('#stage').classList.contains('loading')"
     draw = "document.querySelector('#view').contentWindow.drawScene = {}"
@@ -111,9 +111,7 @@ def test_the_page_shows_a_head_that_turns_and_asks_no_other_site(at_the_rig: tup
     assert any(asked.startswith(here) for asked in person.tab.asked_for)
 
 
-def test_stop_and_the_space_bar_take_the_torque_off_until_it_is_asked_back(
-    at_the_rig: tuple[Rig, Person],
-):
+def test_stop_and_the_space_bar_take_the_torque_off_until_it_is_asked_back(at_the_rig):
     rig, person = at_the_rig
     person.click(STOP)
     wait_for(lambda: "STOP was pressed on the page (browser " in rig.robot.stopped, "the stop")
@@ -138,7 +136,7 @@ def test_stop_and_the_space_bar_take_the_torque_off_until_it_is_asked_back(
     resumed(rig, person)
 
 
-def test_a_slider_moves_the_wish_of_its_joint(at_the_rig: tuple[Rig, Person]):
+def test_a_slider_moves_the_wish_of_its_joint(at_the_rig):
     rig, person = at_the_rig
     person.open("Steer")
     slider = beside("neck yaw", "input[type=range]")
@@ -162,7 +160,7 @@ def test_a_slider_moves_the_wish_of_its_joint(at_the_rig: tuple[Rig, Person]):
     assert cast(Any, rig.orders[-1]).who.startswith("browser ")
 
 
-def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]):
+def test_buttons_ask_and_the_picture_leads(at_the_rig):
     rig, person = at_the_rig
     person.open("Talk")
     person.click(saying("listen"))
@@ -180,7 +178,7 @@ def test_buttons_ask_and_the_picture_leads(at_the_rig: tuple[Rig, Person]):
     wait_for(lambda: present(rig.newest).target.kind != "puppet", "the head being free")
 
 
-def test_a_parameter_is_changed_marked_and_put_back(at_the_rig: tuple[Rig, Person]):
+def test_a_parameter_is_changed_marked_and_put_back(at_the_rig):
     rig, person = at_the_rig
     key = "gaze.lids.blinks_per_min"
     before = rig.tuning.get()[key]

@@ -188,7 +188,7 @@ def shown() -> Iterator[Shown]:
         yield Shown(browser, stub)
 
 
-def test_nothing_is_cut_off_covered_or_too_small(shown: Shown):
+def test_nothing_is_cut_off_covered_or_too_small(shown):
     for size in SIZES:
         shown.size(size)
         for state in CHANGES:
@@ -207,7 +207,7 @@ def test_nothing_is_cut_off_covered_or_too_small(shown: Shown):
             assert found == (size, tab, [])
 
 
-def test_axe_finds_nothing_serious(shown: Shown):
+def test_axe_finds_nothing_serious(shown):
     for size, theme in (("desk", "light"), ("laptop", "dark")):
         shown.size(size)
         shown.state("awake")

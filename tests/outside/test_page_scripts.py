@@ -64,9 +64,7 @@ def headline(person: Person) -> str:
 # --- STOP ---------------------------------------------------------------------------------
 
 
-def test_a_stop_is_sent_until_it_is_confirmed_and_resuming_asks_about_a_hand(
-    page: tuple[Stub, Person],
-):
+def test_a_stop_is_sent_until_it_is_confirmed_and_resuming_asks_about_a_hand(page):
     stub, person = page
     lost: list[dict[str, Any]] = []
 
@@ -97,7 +95,7 @@ def test_a_stop_is_sent_until_it_is_confirmed_and_resuming_asks_about_a_hand(
     wait_for(lambda: stub.orders("resume") == [{"do": "resume", "confirmed": True}], "the order")
 
 
-def test_stop_and_space_work_without_any_other_script(tab: Browser, served: tuple[Stub, str]):
+def test_stop_and_space_work_without_any_other_script(tab, served):
     stub, url = served
     stub.reset()
     stub.missing = {"page.js", "elements.js", "webcam.js", "words.js", "stage.js"}
@@ -121,9 +119,7 @@ def test_stop_and_space_work_without_any_other_script(tab: Browser, served: tupl
 # --- the head and what it looks at --------------------------------------------------------
 
 
-def test_the_first_panel_says_why_and_headline_and_ring_name_the_same_part(
-    page: tuple[Stub, Person],
-):
+def test_the_first_panel_says_why_and_headline_and_ring_name_the_same_part(page):
     stub, person = page
     (someone,) = stub.state.people
     person.open("Watch")
@@ -157,7 +153,7 @@ def test_the_first_panel_says_why_and_headline_and_ring_name_the_same_part(
     assert person.reads(f"person {someone.id} addresses it")
 
 
-def test_the_head_looks_at_the_pointer_over_the_view(page: tuple[Stub, Person]):
+def test_the_head_looks_at_the_pointer_over_the_view(page):
     stub, person = page
     person.click("document.querySelector('#pointer')")
     box = cast(
@@ -189,9 +185,7 @@ def test_the_head_looks_at_the_pointer_over_the_view(page: tuple[Stub, Person]):
 # --- panels -------------------------------------------------------------------------------
 
 
-def test_panels_are_those_of_the_head_and_what_packages_and_clients_say_never_runs(
-    page: tuple[Stub, Person],
-):
+def test_panels_are_those_of_the_head_and_what_packages_and_clients_say_never_runs(page):
     stub, person = page
     person.open("Steer")
     wait_for(lambda: person.reads("wink left", "bold"), "the choices")
@@ -213,9 +207,7 @@ def test_panels_are_those_of_the_head_and_what_packages_and_clients_say_never_ru
     assert person.run(images) == in_the_panel
 
 
-def test_a_refused_value_is_put_back_and_anothers_change_is_shown(
-    page: tuple[Stub, Person],
-):
+def test_a_refused_value_is_put_back_and_anothers_change_is_shown(page):
     stub, person = page
     key = "gaze.lids.blinks_per_min"
     values = dict(cast(dict[str, Any], stub.usual["get"]))
@@ -241,7 +233,7 @@ def test_a_refused_value_is_put_back_and_anothers_change_is_shown(
     wait_for(lambda: stub.orders("save") == [{"do": "save", "path": None}], "the order to save")
 
 
-def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page: tuple[Stub, Person]):
+def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page):
     stub, person = page
     person.open("Play")
     person.click("document.querySelector('#drawer-play input[type=checkbox]')")
@@ -267,9 +259,7 @@ def test_a_track_plays_on_a_timeline_with_its_sound_and_cues(page: tuple[Stub, P
 # --- a rig that has fallen silent
 
 
-def test_what_no_longer_comes_is_grey_and_stop_says_that_it_cannot_work(
-    silent: tuple[Stub, Person],
-):
+def test_what_no_longer_comes_is_grey_and_stop_says_that_it_cannot_work(silent):
     stub, person = silent
     wait_for(
         lambda: person.reads("as it was") and person.reads("STOP does nothing here"), "the words"

@@ -163,7 +163,7 @@ LEFT, RIGHT = [1.0, 0.3, 0.3], [1.0, -0.3, 0.3]
 # Purpose
 
 
-def test_orders_have_outcomes(rig: Rig):
+def test_orders_have_outcomes(rig):
     status, answer = rig.post({"do": "look_at", "p_world_m": LEFT, "tag": "a"}, "?wait_s=15")
     assert status == 200 and answer["tag"] == "a" and answer["outcome"] == "arrived"
     behind = rig.post({"do": "look_at", "p_world_m": [-1, 0.1, 0.3]}, "?wait_s=15")[1]
@@ -175,7 +175,7 @@ def test_orders_have_outcomes(rig: Rig):
     assert "neck_yaw" in rig.post({"do": "status"})[1]["ok"]["joints"]
 
 
-def test_a_websocket_has_outcomes_states_and_events_and_keeps_control_while_it_is_open(rig: Rig):
+def test_a_websocket_has_outcomes_states_and_events_and_keeps_control_while_it_is_open(rig):
     with rig.dial() as end:
         assert heard(end, "tag", "hello")["ok"] == {
             "version": 1, "rig": rig.client.status()["rig"], "name": "eva", "pid": rig.client.pid,
@@ -218,7 +218,7 @@ def receive_states(end: Connection, count: int) -> None:
 # Leaving
 
 
-def test_who_is_killed_or_hangs_while_leading_gives_control_back(rig: Rig):
+def test_who_is_killed_or_hangs_while_leading_gives_control_back(rig):
     end = rig.dial()
     ask(end, do="jog", angles_rad=[["neck_yaw", 0.1]], tag=1)
     heard(end, "tag", 1)
@@ -240,7 +240,7 @@ def test_who_is_killed_or_hangs_while_leading_gives_control_back(rig: Rig):
         rig.until(lambda now: not now["controlled_by"])
 
 
-def test_stop_goes_through_and_who_stopped_may_resume(rig: Rig):
+def test_stop_goes_through_and_who_stopped_may_resume(rig):
     with rig.dial() as end:
         ask(end, do="stop", why="a hand", who="a show", tag="s")
         assert "ok" in heard(end, "tag", "s")
@@ -289,7 +289,7 @@ BAD_QUERIES = (
 )
 
 
-def test_a_bad_message_gets_one_clear_error(rig: Rig):
+def test_a_bad_message_gets_one_clear_error(rig):
     for message, wanted, text in BAD:
         status, answer = rig.post(message)
         assert status == wanted and list(answer) in (["refused"], ["refused", "tag"]), answer
@@ -308,7 +308,7 @@ def test_a_bad_message_gets_one_clear_error(rig: Rig):
 # Allowed visitors
 
 
-def test_without_the_token_or_from_another_site_nothing_is_answered(rig: Rig):
+def test_without_the_token_or_from_another_site_nothing_is_answered(rig):
     for headers in ({"Authorization": "Bearer wrong"}, {"Authorization": "nonsense"}):
         status, answer = rig.get("/state", **headers)
         assert status == 403 and "show the token" in answer["refused"]
@@ -336,7 +336,7 @@ def test_without_the_token_or_from_another_site_nothing_is_answered(rig: Rig):
 LEVEL = '{"do": "set_level", "level": "jaw", "value": 1}'
 
 
-def test_a_flood_is_refused_and_a_stop_of_anybody_goes_through(rig: Rig):
+def test_a_flood_is_refused_and_a_stop_of_anybody_goes_through(rig):
     """So many at once that most are too many, and so few that the connection stays."""
     with rig.dial() as flood:
         heard(flood, "tag", "hello")
@@ -353,7 +353,7 @@ def test_a_flood_is_refused_and_a_stop_of_anybody_goes_through(rig: Rig):
     assert rig.until(lambda now: now["ticks"] > ticks)["stopped"]
 
 
-def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(rig: Rig):
+def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(rig):
     for message in (LEVEL, "rubbish"):
         with rig.dial() as flood:
             heard(flood, "tag", "hello")
@@ -375,7 +375,7 @@ def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(rig: Rig):
         rig.resume()
 
 
-def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig: Rig):
+def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig):
     with rig.dial() as flood:
 
         def read() -> None:
@@ -402,7 +402,7 @@ def test_who_sends_far_too_much_is_disconnected_after_its_stop(rig: Rig):
 # Examples
 
 
-def test_the_browser_example_shows_the_head_and_commands_it(rig: Rig):
+def test_the_browser_example_shows_the_head_and_commands_it(rig):
     file = ROOT / "examples" / "browser.html"
     assert len(file.read_text(encoding="utf-8").splitlines()) <= 100
     with browsing((390, 800)) as browser:

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 from contextlib import suppress
 from math import degrees, nan
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,6 @@ import gazerig
 from gazerig.gaze.types import GazeState, Percept, Vec3
 from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.run.rerun import rerun
-from gazerig.sim_mock.device import Device
 
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
@@ -26,7 +24,7 @@ def head() -> Iterator[gazerig.SimulatedHead]:
         yield head
 
 
-def test_orders_arrive_are_taken_over_and_end(head: gazerig.SimulatedHead):
+def test_orders_arrive_are_taken_over_and_end(head):
     began_s = head.time_s
     order = head.look_at(1.0, 0.5, 0.3)
     assert order.outcome is None and head.time_s == began_s  # time passes only when stepped
@@ -61,9 +59,7 @@ def gaze_error(head: gazerig.Head, point: Vec3) -> float:
     return float(np.arccos(np.dot(sight, to / np.linalg.norm(to))))
 
 
-def test_a_point_out_of_reach_is_told_when_the_head_rests_as_near_as_it_can(
-    head: gazerig.SimulatedHead,
-):
+def test_a_point_out_of_reach_is_told_when_the_head_rests_as_near_as_it_can(head):
     began_s = head.time_s
     order = head.look_at(-1.0, 0.1, 0.3)
     assert order.wait() == "out of reach" and head.time_s - began_s < 5.0
@@ -86,9 +82,7 @@ REFUSED = (
 )
 
 
-def test_what_cannot_be_meant_is_refused_and_values_are_set_and_saved(
-    head: gazerig.SimulatedHead, tmp_path: Path
-):
+def test_what_cannot_be_meant_is_refused_and_values_are_set_and_saved(head, tmp_path):
     for ask, rule in REFUSED:
         with pytest.raises(gazerig.Refused, match=rule):
             ask(head)
@@ -99,7 +93,7 @@ def test_what_cannot_be_meant_is_refused_and_values_are_set_and_saved(
     assert head.set({key: 12.0}) and head.revert() == (f"{key} = 11.0",)
 
 
-def test_people_pixels_and_joints(head: gazerig.SimulatedHead):
+def test_people_pixels_and_joints(head):
     (person,) = head.people
     assert set(person.parts_m) >= {"left eye", "mouth"} and person.age_s < 0.2
     assert head.look_at_person(person.id).wait() == "arrived"
@@ -113,7 +107,7 @@ def test_people_pixels_and_joints(head: gazerig.SimulatedHead):
     head.release_joints()
 
 
-def test_face_and_behaviour(head: gazerig.SimulatedHead):
+def test_face_and_behaviour(head):
     behaviour = head.menus()["behaviour"][-1]
     head.behave(behaviour)
     head.wink("left")
@@ -132,7 +126,7 @@ def test_face_and_behaviour(head: gazerig.SimulatedHead):
     assert head.menus()["behaviour"][0] == behaviour
 
 
-def test_states_events_and_conditions_step_the_head(head: gazerig.SimulatedHead):
+def test_states_events_and_conditions_step_the_head(head):
     began_s = head.state.t_s
     times = [state.t_s - began_s for state in head.states(rate_hz=10.0, seconds=0.5)]
     assert times == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4], abs=0.006)
@@ -148,7 +142,7 @@ def test_states_events_and_conditions_step_the_head(head: gazerig.SimulatedHead)
     assert "controlled by the program: look at 1 0 0.3" in texts
 
 
-def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path: Path):
+def test_a_program_is_recorded_and_done_again_to_the_same_bytes(tmp_path):
     """Also with tracks whose files come, change and go meanwhile."""
     tracks, rig = tmp_path / "tracks", at_rate(tmp_path, "desk", 50.0)
     tracks.mkdir()
@@ -196,7 +190,7 @@ class BadRule:
         raise RuntimeError("out of ideas")
 
 
-def test_a_head_moves_in_its_block_alone_and_parks_whatever_ends_it(devices: list[Device]):
+def test_a_head_moves_in_its_block_alone_and_parks_whatever_ends_it(devices):
     said: list[str] = []
     closed = gazerig.open("desk", fast=True, say=said.append)
     with pytest.raises(gazerig.Error, match="in a with block"):

@@ -10,7 +10,6 @@ import threading
 import time
 from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -28,7 +27,7 @@ LET_GO = "(not )?parked, torque off"
 
 
 @pytest.fixture(autouse=True)
-def own_sockets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def own_sockets(tmp_path, monkeypatch) -> None:
     """Have sockets in a folder without rigs of other tests."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
 
@@ -42,7 +41,7 @@ Open = Callable[[], gazerig.Head]
 
 
 @pytest.fixture
-def opened(said: list[str], tmp_path: Path) -> Open:
+def opened(said: list[str], tmp_path) -> Open:
     """Return what opens a head with a slow loop."""
     rig = at_rate(tmp_path, "desk", 40.0)
     return partial(gazerig.open, rig, mock=True, bus="ideal", scene="face-to-face", say=said.append)
@@ -54,7 +53,7 @@ def assert_let_go(said: list[str], why: str = "the program") -> None:
     assert not [t for t in threading.enumerate() if t.name.startswith("head ")]
 
 
-def test_a_block_leaves_the_program_its_handlers_and_forks_leave_it_the_head(said: list[str]):
+def test_a_block_leaves_the_program_its_handlers_and_forks_leave_it_the_head(said):
     def handle(number: int, frame: object) -> None:
         said.append(signal.Signals(number).name)
 
@@ -88,7 +87,7 @@ def test_a_block_leaves_the_program_its_handlers_and_forks_leave_it_the_head(sai
     assert sys.getswitchinterval() == pytest.approx(switching_s)
 
 
-def test_the_death_of_the_thread_that_opened_it(said: list[str], opened: Open):
+def test_the_death_of_the_thread_that_opened_it(said, opened):
     kept: list[gazerig.Head] = []
 
     def forget() -> None:
@@ -104,9 +103,7 @@ def test_the_death_of_the_thread_that_opened_it(said: list[str], opened: Open):
         kept[0].look_at(1.0, 0.0, 0.3)
 
 
-def test_an_error_of_the_loop_or_of_the_start_reaches_the_program(
-    said: list[str], opened: Open, monkeypatch: pytest.MonkeyPatch
-):
+def test_an_error_of_the_loop_or_of_the_start_reaches_the_program(said, opened, monkeypatch):
     with (
         pytest.raises(gazerig.SetupError, match="nowhere"),
         gazerig.open("desk", port="/dev/nowhere", say=said.append),
@@ -130,9 +127,7 @@ def test_an_error_of_the_loop_or_of_the_start_reaches_the_program(
     assert_let_go(said, "fault: unexpected RuntimeError: a bug")
 
 
-def test_another_program_has_the_same_orders_and_states(
-    opened: Open, monkeypatch: pytest.MonkeyPatch
-):
+def test_another_program_has_the_same_orders_and_states(opened, monkeypatch):
     for name in ("MIN_HOLD_S", "MIN_RESUME_GAP_S"):
         monkeypatch.setattr(body, name, 0.2)
     with opened() as head:
@@ -196,7 +191,7 @@ ENDS = {
 """The exit codes by how a program ends; SystemExit in a Python of its own, which ends only once."""
 
 
-def test_the_end_of_the_interpreter(tmp_path: Path):
+def test_the_end_of_the_interpreter(tmp_path):
     """Nobody left the block: it parks even so, before the program is gone."""
     pipe, programs = subprocess.PIPE, []
     for number, (end, codes) in enumerate(ENDS.items()):

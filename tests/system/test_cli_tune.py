@@ -59,7 +59,7 @@ REFUSED = (
 )
 
 
-def test_values_are_shown_set_refused_and_reverted(head: gazerig.Head):
+def test_values_are_shown_set_refused_and_reverted(head):
     everything = invoked("ctl", "get").out.splitlines()
     assert len(everything) > 200 and everything[0].split() == ["key", "value", "unit", "default"]
     for words, rule in REFUSED:
@@ -84,7 +84,7 @@ def test_values_are_shown_set_refused_and_reverted(head: gazerig.Head):
     assert "2 values undone" in done.err
 
 
-def test_status_menus_stop_and_resume(head: gazerig.Head, rig: str):
+def test_status_menus_stop_and_resume(head, rig):
     said = invoked("ctl", "status").out
     assert f"rig: {rig}, process {os.getpid()}\n" in said
     assert "looks at: " in said and "guard: " in said and "neck_yaw" in said
@@ -112,9 +112,7 @@ def test_status_menus_stop_and_resume(head: gazerig.Head, rig: str):
     assert "nothing to resume" in invoked("ctl", "resume").err
 
 
-def test_stop_stops_every_rig_that_runs_and_says_where_none_does(
-    head: gazerig.Head, rig: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_stop_stops_every_rig_that_runs_and_says_where_none_does(head, rig, tmp_path, monkeypatch):
     def run() -> None:
         body.MIN_HOLD_S = 0.0
         with opened(rig):

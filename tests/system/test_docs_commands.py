@@ -31,7 +31,7 @@ def quick_commands() -> list[str]:
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch) -> Path:
     """Go to a folder with the files that the papers speak of."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "myrig.yaml").write_bytes((ROOT / "config/rigs/desk.yaml").read_bytes())
@@ -46,7 +46,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_quick_commands_work(folder: Path, capfd: pytest.CaptureFixture[str]):
+def test_quick_commands_work(folder, capfd):
     for words in quick_commands():
         if words.startswith("run "):
             words = re.sub(r"--seconds \S+", "", words) + " --fast --seconds 0.05"
@@ -76,7 +76,7 @@ DOCTOR = "doctor --mock --fix"
 
 
 @pytest.mark.usefixtures("simulated_wires")
-def test_commands_work_as_they_are_written(folder: Path, capfd: pytest.CaptureFixture[str]):
+def test_commands_work_as_they_are_written(folder, capfd):
     (folder / "my.yaml").write_bytes((folder / "myrig.yaml").read_bytes())
     typed("study", "design", "--example", "study.yaml")
     printed = {}
@@ -111,7 +111,7 @@ def test_python_of_papers_runs():
     assert names["paths"]["neck"]
 
 
-def test_parts_of_a_package_are_found_by_their_registration(tmp_path: Path):
+def test_parts_of_a_package_are_found_by_their_registration(tmp_path):
     code, registered = (
         "\n".join(
             block.text

@@ -45,7 +45,7 @@ ENDLESS = [w for w in COMMANDS if w.startswith("emulate ")]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def folder(tmp_path_factory) -> Iterator[Path]:
     """A folder with its own sockets, in which the commands are typed."""
     folder = tmp_path_factory.mktemp("live")
     with pytest.MonkeyPatch.context() as patch:
@@ -84,7 +84,7 @@ def works_until_ctrl_c(process: subprocess.Popen[str], first: str) -> None:
         process.communicate()
 
 
-def test_commands_to_a_running_head_work(folder: Path):
+def test_commands_to_a_running_head_work(folder):
     """Of one head for all: the expressive one with the track of the tutorial."""
     [agree] = [b.text for b in blocks("yaml") if b.text.startswith('description: "a small nod')]
     (folder / "tracks").mkdir()
@@ -111,7 +111,7 @@ def _works_on_a_head(words: str) -> None:
     works("ctl revert")
 
 
-def test_commands_to_servos_work(folder: Path):
+def test_commands_to_servos_work(folder):
     """With emulated ones instead of those on a port."""
     for words in TO_SERVOS:
         copy(
@@ -121,7 +121,7 @@ def test_commands_to_servos_work(folder: Path):
         works(f"{words} --mock" + " --once" * (words == "monitor"), answers="y\n")
 
 
-def test_commands_on_a_recording_work(folder: Path):
+def test_commands_on_a_recording_work(folder):
     """On one under the name that papers give theirs; a viewer reads the rig's description in it."""
     copy("desk", folder / "my.yaml")
     works("run my.yaml --mock --fast --seconds 1 --scene face-to-face --record evening.mcap")
@@ -143,7 +143,7 @@ def test_commands_on_a_recording_work(folder: Path):
 
 
 @pytest.mark.pty
-def test_commands_that_run_until_they_are_ended_work(folder: Path):
+def test_commands_that_run_until_they_are_ended_work(folder):
     copy("desk", folder / "my.yaml")
     for words in ENDLESS:
         work = gazerig_branch(*shlex.split(words.replace("/tmp/", f"{folder}/")))

@@ -7,7 +7,6 @@ import signal
 import socket
 import threading
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from fakes.voice_assistant import Assistant, free_port, lva
@@ -55,9 +54,7 @@ def talking(head: gazerig.Head) -> int:
     return int(found[1])
 
 
-def test_doors_begin_and_end_with_the_head(
-    assistant: Assistant, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_doors_begin_and_end_with_the_head(assistant, tmp_path, monkeypatch):
     """STOP works meanwhile; a killed door costs its state after a second, and is reported."""
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     said: list[str] = []

@@ -26,9 +26,7 @@ Shown = Callable[..., list[str]]
 
 
 @pytest.fixture
-def shown(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
-) -> Shown:
+def shown(monkeypatch, capsys, tmp_path) -> Shown:
     """Return what runs an example and returns the lines that it prints."""
     opened = gazerig.open
 
@@ -51,7 +49,7 @@ def numbers(line: str) -> list[float]:
     return [float(one) for one in re.findall(r"[-+]?\d+(?:\.\d+)?", line)]
 
 
-def test_the_gaze_runs_round_the_circle_and_the_visitor_is_printed_where_he_is(shown: Shown):
+def test_the_gaze_runs_round_the_circle_and_the_visitor_is_printed_where_he_is(shown):
     lines = shown("circle.py")
     gaze = [numbers(line) for line in lines]
     assert len(lines) == 12 and all(line.startswith("arrived") for line in lines)
@@ -67,9 +65,7 @@ def test_the_gaze_runs_round_the_circle_and_the_visitor_is_printed_where_he_is(s
     assert sum("looks at face 1" in line for line in lines) > 10
 
 
-def test_own_detectors_cameras_and_rules_lead_the_gaze(
-    shown: Shown, monkeypatch: pytest.MonkeyPatch
-):
+def test_own_detectors_cameras_and_rules_lead_the_gaze(shown, monkeypatch):
     states = gazerig.SimulatedHead.states
     with monkeypatch.context() as patch:  # drawn pictures take time
         patch.setattr(
@@ -91,7 +87,7 @@ def test_own_detectors_cameras_and_rules_lead_the_gaze(
     assert all(numbers(line.split("gaze")[1])[0] > 3.0 for line in lines[2:])  # to the left
 
 
-def test_moods_and_loudness_move_the_jaw_and_tracks_the_head(shown: Shown):
+def test_moods_and_loudness_move_the_jaw_and_tracks_the_head(shown):
     lines = shown("face.py")
     jaw = {line.split()[0]: numbers(line)[0] for line in lines}
     assert jaw["surprised"] == pytest.approx(12.0, abs=1.0)
@@ -104,7 +100,7 @@ def test_moods_and_loudness_move_the_jaw_and_tracks_the_head(shown: Shown):
     assert lowest[2] < lowest[0] - 3.0 and lowest[0] < lowest[1] - 4.0
 
 
-def test_the_second_head_looks_where_the_first_does(shown: Shown):
+def test_the_second_head_looks_where_the_first_does(shown):
     lines = shown("two_heads.py")
     yaws = [numbers(line.split("yaw")[1]) for line in lines[10:]]
     assert len(yaws) > 20
@@ -114,9 +110,7 @@ def test_the_second_head_looks_where_the_first_does(shown: Shown):
     assert max(other for _, other in yaws) - min(other for _, other in yaws) > 8.0
 
 
-def test_the_own_door_passes_words_on_and_a_key_starts_a_track(
-    monkeypatch: pytest.MonkeyPatch, shown: Shown
-):
+def test_the_own_door_passes_words_on_and_a_key_starts_a_track(monkeypatch, shown):
     head, words = TalkingHead(), iter((b"listening\n", b"sing", b"\xff", b"speaking"))
     port = SimpleNamespace(bind=lambda address: None, recv=lambda most: next(words))
     monkeypatch.setattr(gazerig, "connect", lambda **_: nullcontext(head))
@@ -139,7 +133,7 @@ def test_the_own_door_passes_words_on_and_a_key_starts_a_track(
     assert shown("midi.py")[-2:] == ["nod takes 1 s", "stopped"]
 
 
-def test_the_sweep_shows_what_speeds_do_and_repeats_itself(shown: Shown):
+def test_the_sweep_shows_what_speeds_do_and_repeats_itself(shown):
     lines = shown("sweep.py")
     rows = [numbers(line) for line in lines[1:]]
     met = {(eyes, head): gaze_s for eyes, head, gaze_s, _ in rows}

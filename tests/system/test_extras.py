@@ -60,7 +60,7 @@ def without_extras(
 
 
 @needs_all_features
-def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_done(tmp_path: Path):
+def test_a_command_that_needs_an_extra_names_it_in_one_line_before_anything_is_done(tmp_path):
     codes, said = without_extras(
         tmp_path,
         ("report", "--scene", "face-to-face"),
@@ -121,7 +121,7 @@ with_mujoco = pytest.mark.skipif(
 
 
 @pytest.mark.pty
-def test_the_process_of_the_loop_imports_little(tmp_path: Path):
+def test_the_process_of_the_loop_imports_little(tmp_path):
     film = write_film(tmp_path / "film.avi", 5, 25.0)
     options = {"video": film, "page": "127.0.0.1:8770"}
     text, _ = python(RUN.format(options=options, later=LATER), tmp_path)
@@ -132,7 +132,7 @@ def test_the_process_of_the_loop_imports_little(tmp_path: Path):
 
 
 @with_mujoco
-def test_the_loop_of_an_ordinary_run_knows_no_world(tmp_path: Path):
+def test_the_loop_of_an_ordinary_run_knows_no_world(tmp_path):
     """Nor does that of a world in real time know MuJoCo: it is in two other processes."""
     pytest.importorskip("gazerig.features.world")
     code = (
@@ -158,7 +158,7 @@ RUN_COMMAND = ("run", "desk", "--mock", "--fast", "--no-page", "--scene", "visit
 
 
 @needs_all_features
-def test_without_extras_and_without_features_the_head_runs_with_the_same_bytes(tmp_path: Path):
+def test_without_extras_and_without_features_the_head_runs_with_the_same_bytes(tmp_path):
     codes, said = without_extras(
         tmp_path,
         RUN_COMMAND,

@@ -3,7 +3,6 @@
 import os
 import pty
 import signal
-from pathlib import Path
 
 import pytest
 from papers import ROOT
@@ -16,7 +15,7 @@ while :; do sleep 0.1; done
 
 
 @pytest.mark.pty
-def test_ctrl_c_ends_make_without_an_error(tmp_path: Path):
+def test_ctrl_c_ends_make_without_an_error(tmp_path):
     folder = tmp_path / "env/bin"
     folder.mkdir(parents=True)
     for name, text in (("gazerig", PROGRAM), ("python", "#!/bin/sh\n")):

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
 from math import inf, nextafter
-from pathlib import Path
 
 import pytest
 from fakes.runs import VISIT, record
@@ -72,9 +71,7 @@ ORDERS: dict[int, tuple[Command, ...]] = {
 }  # fmt: skip
 
 
-def test_the_same_code_and_configuration_give_the_same_to_the_bit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_the_same_code_and_configuration_give_the_same_to_the_bit(tmp_path, monkeypatch):
     """Of a run in which one of all is ordered, with tracks whose files are gone, and of the same
     with one other bit.
     """

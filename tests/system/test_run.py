@@ -2,7 +2,6 @@
 
 import json
 import re
-from pathlib import Path
 from typing import Any
 
 import cv2
@@ -18,7 +17,7 @@ from gazerig.robot.recording.read import RunRecording
 from gazerig.robot.run.options import RunOptions
 
 
-def test_a_round_of_the_visitor_who_comes_moves_waves_leaves_and_comes_back(tmp_path: Path):
+def test_a_round_of_the_visitor_who_comes_moves_waves_leaves_and_comes_back(tmp_path):
     slow = at_rate(tmp_path, "desk", 50.0)
     asked = RunOptions(True, True, seed=1, scene="visitor", rig=slow, seconds=44.0)
     visitor = simulate(load_rig(slow), asked)
@@ -41,7 +40,7 @@ def test_a_round_of_the_visitor_who_comes_moves_waves_leaves_and_comes_back(tmp_
     assert np.percentile(off_deg, 95.0) < 6.5
 
 
-def test_e59_before_a_photo_same_seed_same_bytes_in_another_process(tmp_path: Path):
+def test_e59_before_a_photo_same_seed_same_bytes_in_another_process(tmp_path):
     data = pytest.importorskip("skimage.data", reason="scikit-image ships the photo")
     photo = str(tmp_path / "photo.png")
     cv2.imwrite(photo, np.ascontiguousarray(data.astronaut()[:, :, ::-1]))
@@ -78,7 +77,7 @@ FAULTS = (
 )
 
 
-def test_what_a_person_can_mend_is_one_line_and_exit_code_2(capfd: pytest.CaptureFixture[str]):
+def test_what_a_person_can_mend_is_one_line_and_exit_code_2(capfd):
     for words, message in FAULTS:
         code, said = typed("run", "--no-page", *words), capfd.readouterr().err
         assert (code, message in said, said.count("\n")) == (2, True, 1), said

@@ -1,9 +1,7 @@
 """Tracks on whole robots over emulated servos in simulated time: followed by joints and eyes."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from math import degrees
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -55,9 +53,7 @@ frames:
 """
 
 
-def test_what_a_track_owns_is_its_alone_and_gaze_keeps_the_eyes_on_the_point(
-    tmp_path: Path, started: Callable[[Rig], Run]
-):
+def test_what_a_track_owns_is_its_alone_and_gaze_keeps_the_eyes_on_the_point(tmp_path, started):
     file = tmp_path / "own.yaml"
     file.write_text(OWNED, encoding="utf-8")
     rig = replace(steady("expressive"), track_files=(str(file),))

@@ -17,11 +17,11 @@ pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
 @pytest.fixture
-def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
+def rig(monkeypatch) -> Iterator[TickedRig]:
     yield from connected(monkeypatch)
 
 
-def test_tracks_from_the_command_line_and_of_a_head_that_is_stopped_or_led_by_hand(rig: TickedRig):
+def test_tracks_from_the_command_line_and_of_a_head_that_is_stopped_or_led_by_hand(rig):
     assert "nod takes 1.0 s" in gazerig("ctl", "play", "nod")
     assert set_client(rig.commands[-1], "") == Play("nod")
     before = rig.tick(20)["neck_pitch"]

@@ -90,7 +90,7 @@ def _merge(into: Any, more: Any, place: str) -> None:
 pytestmark = pytest.mark.usefixtures("simulated_wires")
 
 
-def at_step(folder: Path, step: int, monkeypatch: pytest.MonkeyPatch) -> Path:
+def at_step(folder: Path, step: int, monkeypatch) -> Path:
     """Go to an empty folder for a step."""
     here = folder / str(step)
     here.mkdir()
@@ -98,7 +98,7 @@ def at_step(folder: Path, step: int, monkeypatch: pytest.MonkeyPatch) -> Path:
     return here
 
 
-def test_every_command_of_every_step_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_every_command_of_every_step_works(tmp_path, monkeypatch):
     for step in range(1, len(steps()) + 1):
         write_files(at_step(tmp_path, step, monkeypatch), step)
         for line in commands(step):
@@ -125,9 +125,7 @@ def _without(words: tuple[str, ...], *options: str) -> list[str]:
     ]
 
 
-def test_commands_to_a_running_head_and_the_program_that_greets_work(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_commands_to_a_running_head_and_the_program_that_greets_work(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path))
     for step in (6, 7):
         write_files(at_step(tmp_path, step, monkeypatch), step)

@@ -42,9 +42,7 @@ def ran(
     return session.Session(made, lambda: None, said.append).run()
 
 
-def test_no_memory_in_the_loop_leaves_by_the_door(
-    devices: list[Device], monkeypatch: pytest.MonkeyPatch
-):
+def test_no_memory_in_the_loop_leaves_by_the_door(devices, monkeypatch):
     tick, ticks = Robot.tick, []
 
     def short_of_memory(self: Robot, *words: Any) -> object:
@@ -63,9 +61,7 @@ def test_no_memory_in_the_loop_leaves_by_the_door(
         ticks.clear()
 
 
-def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
-    devices: list[Device], monkeypatch: pytest.MonkeyPatch
-):
+def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(devices, monkeypatch):
     def broken(self: JointFaults, tick: object) -> None:
         raise RuntimeError("plug-in")
 
@@ -78,9 +74,7 @@ def test_an_observer_that_raises_is_left_out_once_and_the_run_goes_on(
     ]
 
 
-def test_joints_that_faults_hold_and_servos_silent_at_the_end_are_named(
-    devices: list[Device], monkeypatch: pytest.MonkeyPatch
-):
+def test_joints_that_faults_hold_and_servos_silent_at_the_end_are_named(devices, monkeypatch):
     stop = Robot.stop
 
     def unplugged(self: Robot) -> tuple[str, ...]:

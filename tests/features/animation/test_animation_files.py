@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from command_line import invoked
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import load_rig
 from gazerig.config.tracks import load_track
 from gazerig.drivers.errors import SetupError
 from gazerig.features.animation.animation import ImportedAnimation, Series, joint_map
@@ -47,9 +47,7 @@ EXCEL = "\ufeffsep=;\r\n;;\r\n" + WIDE.replace(",", ";").replace(".", ",").repla
 
 
 @pytest.mark.parametrize("text", [WIDE, LONG, FRAMES, EXCEL, "# from\n\n" + WIDE])
-def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(
-    desk_rig: Rig, text: str, tmp_path: Path
-):
+def test_wide_and_long_tables_and_frame_numbers_are_the_same_track(desk_rig, text, tmp_path):
     path = tmp_path / "mine.yaml"
     reply = write_track(desk_rig, path, read(table(tmp_path, text), 24.0), "x")
     assert [(f.time_s, f.head_pitch_deg, f.head_yaw_deg) for f in load_track(path).frames] == [
@@ -69,13 +67,13 @@ BAD = {
 
 
 @pytest.mark.parametrize("text", BAD, ids=range(len(BAD)))
-def test_bad_rows_are_named_with_their_line(desk_rig: Rig, text: str, tmp_path: Path):
+def test_bad_rows_are_named_with_their_line(desk_rig, text, tmp_path):
     with pytest.raises(SetupError) as caught:
         read(table(tmp_path, text))
     assert BAD[text] in str(caught.value)
 
 
-def test_the_command_imports_a_table_for_a_rig(tmp_path: Path):
+def test_the_command_imports_a_table_for_a_rig(tmp_path):
     path = table(tmp_path, WIDE)
     words = ["import", "desk", str(path), "greet", "--folder", str(tmp_path)]
     done = invoked(*words)
@@ -133,7 +131,7 @@ def read_bytes(
     return animation(folder / name, **options)
 
 
-def test_gltf_rotations_become_joint_angles(tmp_path: Path):
+def test_gltf_rotations_become_joint_angles(tmp_path):
     from scipy.spatial.transform import Rotation
 
     times, angles = [0.0, 0.5, 1.0], [0.0, 150.0, 250.0]
@@ -168,7 +166,7 @@ def test_angles_are_relative_to_the_rest_pose_of_a_node():
     assert angles == pytest.approx(wanted, abs=1e-9) and off.max() < 1e-5
 
 
-def test_gltf_splines_are_read(tmp_path: Path):
+def test_gltf_splines_are_read(tmp_path):
     from scipy.spatial.transform import Rotation
 
     keys = np.stack([about("z", angles) for angles in ([4.0, 2.0, 0.0], [0.0, 20.0, 0.0],
@@ -213,7 +211,7 @@ BAD_FILES: dict[str, tuple[bytes, str]] = {
 
 
 @pytest.mark.parametrize("name", BAD_FILES)
-def test_a_bad_file_is_one_message_with_place_and_remedy(name: str, tmp_path: Path):
+def test_a_bad_file_is_one_message_with_place_and_remedy(name, tmp_path):
     data, message = BAD_FILES[name]
     with pytest.raises(SetupError) as caught:
         read_bytes(data, tmp_path, name)
@@ -221,7 +219,7 @@ def test_a_bad_file_is_one_message_with_place_and_remedy(name: str, tmp_path: Pa
     assert text.startswith(f"{tmp_path / name}") and message in text and "\n" not in text
 
 
-def test_positions_of_the_blender_add_on_are_those_of_the_servos(desk_rig: Rig, tmp_path: Path):
+def test_positions_of_the_blender_add_on_are_those_of_the_servos(desk_rig, tmp_path):
     joint = desk_rig.joints["neck_yaw"]
     steps = [joint.steps(np.radians(angle)) for angle in (0.0, 12.0, -7.0)]
     file = {"fps": 24, "frames": 3, "servos": {"7": {"name": "neck_yaw", "positions": steps}}}
@@ -253,7 +251,7 @@ Between curves the last place is held; a curve ends where the next one begins.
 """
 
 
-def test_curves_of_bottango_have_the_handles_of_its_driver(desk_rig: Rig, tmp_path: Path):
+def test_curves_of_bottango_have_the_handles_of_its_driver(desk_rig, tmp_path):
     file = [{"Animations": [{"Animation Name": n, "Animation Commands": BOTTANGO} for n in "ab"]}]
     with pytest.raises(SetupError, match="several animations: add --clip NAME with one of: a, b"):
         read_bytes(json.dumps(file).encode(), tmp_path, "b.json")
@@ -265,9 +263,7 @@ def test_curves_of_bottango_have_the_handles_of_its_driver(desk_rig: Rig, tmp_pa
     assert found.notes == ("2 on/off, trigger and colour events are left out",)
 
 
-def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(
-    desk_rig: Rig, tmp_path: Path
-):
+def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(desk_rig, tmp_path):
     times = [0.0, 1.0, 2.0]
     (tmp_path / "far.glb").write_bytes(clip(times, about("z", [40.0, -20.0, 30.0])))
     done = invoked("import", "desk", str(tmp_path / "far.glb"), "--folder", str(tmp_path))
@@ -283,7 +279,7 @@ def test_an_imported_pose_is_owned_and_begins_and_ends_within_the_limits(
     assert np.abs(every[2, :, 0]).max() < 1.002 * most and lead_s < 1.0
 
 
-def test_a_table_moves_the_head_and_the_eyes_stay_on_their_target(desk_rig: Rig, tmp_path: Path):
+def test_a_table_moves_the_head_and_the_eyes_stay_on_their_target(desk_rig, tmp_path):
     path = table(tmp_path, "time,neck_yaw,left_eye_pan\n0,0,0\n0.5,8,-8\n1.2,0,0\n")
     write_track(desk_rig, tmp_path / "nod.yaml", read(path), "x")
     frames = load_track(tmp_path / "nod.yaml").frames

@@ -7,12 +7,12 @@ from served_rigs import hide_real_ports, rig_files
 
 
 @pytest.fixture
-def no_real_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+def no_real_ports(monkeypatch) -> None:
     hide_real_ports(monkeypatch)
 
 
 @pytest.fixture
-def rigs(tmp_path: Path) -> dict[str, str]:
+def rigs(tmp_path) -> dict[str, str]:
     """Return the paths of rigs of one's own: desk, feetech, maker, pca9685, mixed."""
     return rig_files(tmp_path)
 

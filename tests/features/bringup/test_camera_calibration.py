@@ -1,10 +1,9 @@
 """The lens found from pictures of a board, drawn through a lens that is known."""
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from math import radians
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -100,9 +99,7 @@ def flat(view: DetectedBoard) -> bool:
         ),
     ],
 )
-def test_views_that_do_not_show_the_lens_are_not_enough(
-    made: Callable[[], list[DetectedBoard]], missing: str
-):
+def test_views_that_do_not_show_the_lens_are_not_enough(made, missing):
     collector = ViewCollector(GUESS, *SIZE)
     for view in made():
         collector.offer(view)
@@ -124,7 +121,7 @@ def test_corners_that_jump_about_are_refused_with_the_number():
 
 
 @pytest.mark.parametrize("paper", sorted(PAPERS_MM))
-def test_the_page_has_the_size_of_the_paper_in_print(paper: str, tmp_path: Path):
+def test_the_page_has_the_size_of_the_paper_in_print(paper, tmp_path):
     from PIL import Image
 
     wide_mm, high_mm = PAPERS_MM[paper]
@@ -182,7 +179,7 @@ def neck(scene: BoardScene) -> MovedNeck:
     return MovedNeck(scene, SimulatedClock())
 
 
-def test_a_head_that_looks_around_finds_its_camera(scene: BoardScene, neck: MovedNeck):
+def test_a_head_that_looks_around_finds_its_camera(scene, neck):
     angles = neck_angles(RANGES, BOARD_LENS, 640, 400)[:12]
     now_s = neck.clock.now_s
     steps = list(

@@ -40,7 +40,7 @@ _find, _found = MtcnnDetector.find, dict[object, Any]()
 
 
 @pytest.fixture(autouse=True)
-def pictures_are_searched_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def pictures_are_searched_once(monkeypatch) -> None:
     """Remember faces: the detector keeps nothing from one picture to the next."""
 
     def find(self: MtcnnDetector, image: np.ndarray) -> Any:

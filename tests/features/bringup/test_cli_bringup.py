@@ -108,9 +108,7 @@ def test_sigterm_while_jogging_parks_and_lets_go():
         assert not any(status(desk.command, servo_id)["torque"] for servo_id in range(1, 10))
 
 
-def test_a_servo_that_does_not_confirm_its_torque_off_is_named(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_a_servo_that_does_not_confirm_its_torque_off_is_named(monkeypatch):
     stop = ManualControl.stop
 
     def unconfirmed(self: ManualControl) -> tuple[str, ...]:
@@ -138,7 +136,7 @@ def test_nonsense_is_refused_before_the_torque_is_on(joint, angle, says):
 # --- hobby servos and rigs of several kinds
 
 
-def test_on_real_wires_hobby_servos_are_asked_for_first(rigs: dict[str, str]):
+def test_on_real_wires_hobby_servos_are_asked_for_first(rigs):
     rig = rigs["mixed"]
     with served(rig) as buses:
         refused = invoked("jog", rig, "neck_yaw", "5", "--port", buses.ports)
@@ -196,7 +194,7 @@ def calibrated(*words: str) -> Invoked:
 # --- joints
 
 
-def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_path: Path):
+def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig, tmp_path):
     before = rig.read_text("utf-8")
     answers = answers_in(tmp_path, "turn -400", "", "turn 700", "", "turn -290", "", "y")
     done = calibrated(str(rig), "--mock", "--joint", "left_eye_pan", "--answers", answers)
@@ -212,7 +210,7 @@ def test_by_hand_a_joint_is_written_into_the_rig_with_a_backup(rig: Path, tmp_pa
     assert "joints.left_eye_pan.zero_step" in done.err
 
 
-def test_a_lens_is_measured_and_written(rig: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_lens_is_measured_and_written(rig, monkeypatch):
     monkeypatch.setattr(camera, "RealClock", SimulatedClock)
     done = calibrated("camera", str(rig), "--mock", "--what", "lens", "--yes")
     lens = load_rig(str(rig)).camera.lens
@@ -226,7 +224,7 @@ def test_a_lens_is_measured_and_written(rig: Path, monkeypatch: pytest.MonkeyPat
 
 
 @pytest.mark.pty
-def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(rigs: dict[str, str]):
+def test_ctrl_c_while_calibrating_lets_go_and_writes_nothing(rigs):
     rig = Path(rigs["maker"])
     before = rig.read_bytes()
     with served(str(rig)) as buses:

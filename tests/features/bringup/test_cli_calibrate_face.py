@@ -1,7 +1,5 @@
 """calibrate face as it is typed: keys, scripts, what is written and what is not."""
 
-from pathlib import Path
-
 import pytest
 from command_line import Invoked, answers_in, invoked
 from commands_started import OnTerminal
@@ -21,14 +19,14 @@ def run(*words: str) -> Invoked:
     return invoked("calibrate", "face", *words)
 
 
-def script(tmp_path: Path, *lines: str) -> tuple[str, str]:
+def script(tmp_path, *lines: str) -> tuple[str, str]:
     return "--answers", answers_in(tmp_path, *lines)
 
 
 # --- what is written
 
 
-def test_the_offsets_steered_to_are_in_the_rig_file(rig: Path, tmp_path: Path):
+def test_the_offsets_steered_to_are_in_the_rig_file(rig, tmp_path):
     before = rig.read_text("utf-8")
     answers = script(
         tmp_path,
@@ -68,7 +66,7 @@ def test_the_offsets_steered_to_are_in_the_rig_file(rig: Path, tmp_path: Path):
     ],
 )
 def test_nothing_chosen_a_no_or_what_is_wrong_writes_nothing(
-    rig: Path, tmp_path: Path, words: tuple[str, ...], lines: tuple[str, ...], code: int, says: str
+    rig, tmp_path, words, lines, code, says
 ):
     before = rig.read_bytes()
     done = run(str(rig), "--mock", *words, *script(tmp_path, *lines))
@@ -89,7 +87,7 @@ def test_what_a_terminal_sends_for_keys():
 
 
 # Parking takes a bounded time, in which a starved machine does not reach the end.
-def test_ctrl_c_parks_and_writes_nothing(rig: Path):
+def test_ctrl_c_parks_and_writes_nothing(rig):
     before = rig.read_bytes()
     with OnTerminal("calibrate", "face", str(rig), "--mock", "--yes") as sitting:
         sitting.reads("the tip of your nose: steer")

@@ -442,7 +442,7 @@ def test_a_board_that_is_not_there_is_one_finding_with_its_remedy():
     ("counts", "level", "remedy"),
     [(307, "warn", "gazerig jog"), (500, "error", "board's power off and on")],
 )
-def test_pulses_of_a_pca9685_that_were_left_on(counts: int, level: str, remedy: str):
+def test_pulses_of_a_pca9685_that_were_left_on(counts, level, remedy):
     rig = Pca9685Rig()
     rig.leave_pulse(0, counts)
     found = examine_pca9685(rig.port, PCA9685, CHANNELS)[0]

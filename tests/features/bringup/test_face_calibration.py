@@ -27,7 +27,7 @@ KEYS = st.lists(st.sampled_from(get_args(Key)), max_size=60)
 
 
 @given(KEYS)
-def test_no_keys_lead_off_the_face_or_out_of_its_plane(keys: list[Key]):
+def test_no_keys_lead_off_the_face_or_out_of_its_plane(keys):
     state = FaceCalibration({})
     for key in keys:
         state.apply(key)

@@ -22,7 +22,7 @@ written into |
 """What is read and what is then typed; at last half-way between each two marks."""
 
 
-def test_keys_steer_a_hobby_servo_at_the_terminal(rigs: dict[str, str]):
+def test_keys_steer_a_hobby_servo_at_the_terminal(rigs):
     rig = rigs["maker"]
     words = (rig, "--mock", "--yes", "--joint", "eyes_tilt", "--margin", "0")
     with OnTerminal("calibrate", *words) as terminal:

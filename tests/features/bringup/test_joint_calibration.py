@@ -10,7 +10,7 @@ from emulated_rig import EmulatedRig
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.config.schema import Rig, load_rig
+from gazerig.config.schema import load_rig
 from gazerig.drivers.errors import BusLost, ServoFault, ServoMissing
 from gazerig.drivers.maestro.board import MaestroParams
 from gazerig.drivers.servo_bus.settings import write_settings
@@ -129,9 +129,7 @@ TURN = 4096
     moves=st.lists(st.integers(-1500, 1500), max_size=60),
     wraps=st.booleans(),
 )
-def test_a_position_is_followed_over_the_seam_however_it_is_reported(
-    start: int, moves: list[int], wraps: bool
-):
+def test_a_position_is_followed_over_the_seam_however_it_is_reported(start, moves, wraps):
     track, true = PositionUnwrapper(), start
     assert track.see(start, 0.0) == start
     for i, move in enumerate(moves, 1):
@@ -184,7 +182,7 @@ A degree is 4096 / 360 = 11.38 steps: 454 are 39.90 deg. Ranges are rounded down
 
 
 @pytest.mark.parametrize("row", MARKS.strip().splitlines())
-def test_marks_are_a_calibration_or_refused_with_the_reason(row: str):
+def test_marks_are_a_calibration_or_refused_with_the_reason(row):
     name, places, how, due = (part.strip() for part in row.split("|"))
     ratio, margin = map(float, how.split())
     marks, joint = Marks(*map(int, places.split())), replace(EYE, ratio=ratio)
@@ -236,7 +234,7 @@ def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set():
         (STS, "temperature {id} 90", "overheating: let it cool"),
     ],
 )
-def test_a_servo_that_suffers_or_is_silent_is_named(joint: JointParams, fault: str, says: str):
+def test_a_servo_that_suffers_or_is_silent_is_named(joint, fault, says):
     bench = Bench(joint)
     bench.command(fault)
     with pytest.raises(ServoFault, match=says):
@@ -310,7 +308,7 @@ def test_eyes_are_measured_and_their_pulses_end():
     assert any("Keep your fingers out" in line for line in bench.said)
 
 
-def test_a_channel_that_gives_pulses_does_not_jump(maker_rig: Rig):
+def test_a_channel_that_gives_pulses_does_not_jump(maker_rig):
     bench = LinkageBench("eyes_pan")
     bench.port.setBaudRate(115_200)
     bench.port.write(MaestroParams(crc=maker_rig.bus.maestro.crc).targets({0: 1534 * 4}))
@@ -337,7 +335,7 @@ def test_it_moves_slowly_and_never_outside_the_pulses_of_a_servo():
 
 
 @pytest.mark.parametrize("why", ["SIGINT", "q"])
-def test_whoever_ends_it_gets_a_limp_servo(why: str):
+def test_whoever_ends_it_gets_a_limp_servo(why):
     bench = LinkageBench("eyes_pan", "", "1700")
     bench.script += [""] if why == "SIGINT" else []
     if why == "SIGINT":

@@ -1,7 +1,5 @@
 """Puppeteering: a track of some joints of a running head, while a track plays on others."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -41,7 +39,7 @@ class SteppedClock:
             self.head.step(0.01)
 
 
-def test_a_puppeteered_jaw_becomes_a_track_of_its_own(tmp_path: Path):
+def test_a_puppeteered_jaw_becomes_a_track_of_its_own(tmp_path):
     rig_file = tmp_path / "rig.yaml"
     (tmp_path / "turn.yaml").write_text(TURN)
     rig_file.write_text(

@@ -85,7 +85,7 @@ def bench(desk_rig: Rig) -> Iterator[Bench]:
     assert not any(made.torque())
 
 
-def test_one_joint_moves_and_the_others_hold(bench: Bench):
+def test_one_joint_moves_and_the_others_hold(bench):
     before = bench.where()
     moved = bench.control.jog("neck_yaw", 20.0)
     after = bench.where()
@@ -103,9 +103,7 @@ def test_one_joint_moves_and_the_others_hold(bench: Bench):
     angle=st.floats(-60.0, 60.0),
     speed=st.floats(5.0, 60.0),
 )
-def test_no_goal_is_faster_than_asked_nor_outside_the_range(
-    desk_rig: Rig, joint: str, angle: float, speed: float
-):
+def test_no_goal_is_faster_than_asked_nor_outside_the_range(desk_rig, joint, angle, speed):
     bench = crooked(desk_rig, speed)
     bench.control.start()
     moved = bench.control.pose({joint: angle})
@@ -127,9 +125,7 @@ def test_no_goal_is_faster_than_asked_nor_outside_the_range(
         ("overload 7", 0.5, "overload", "torque_off"),
     ],
 )
-def test_a_joint_that_cannot_is_named_and_not_pushed(
-    bench: Bench, fault: str, after_s: float, reason: str, end_reason: str
-):
+def test_a_joint_that_cannot_is_named_and_not_pushed(bench, fault, after_s, reason, end_reason):
     bench.at[bench.clock.now_s() + after_s] = fault
     before = bench.where()["neck_yaw"]
     moved = bench.control.jog("neck_yaw", 30.0)
@@ -141,7 +137,7 @@ def test_a_joint_that_cannot_is_named_and_not_pushed(
     assert bench.where()["neck_yaw"] < 10.0
 
 
-def test_a_stop_ends_the_way_and_parking_goes_on(bench: Bench, desk_rig: Rig):
+def test_a_stop_ends_the_way_and_parking_goes_on(bench, desk_rig):
     bench.why = "SIGINT"
     moved = bench.control.jog("neck_yaw", 40.0)
     assert moved.end_reason == "SIGINT" and moved.seconds < 0.1

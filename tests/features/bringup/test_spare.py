@@ -93,7 +93,7 @@ def chain_of(folder: Path, name: str, *more: ServoSpec, command: str = "") -> It
 
 
 @pytest.fixture
-def writes(monkeypatch: pytest.MonkeyPatch) -> list[Write]:
+def writes(monkeypatch) -> list[Write]:
     """Return a list of all writes of ids and baud rates."""
     done: list[Write] = []
     write = Transactions.write
@@ -108,9 +108,7 @@ def writes(monkeypatch: pytest.MonkeyPatch) -> list[Write]:
 
 
 @every
-def test_the_doctor_offers_a_spare_and_adopts_it_with_fix(
-    tmp_path: Path, name: str, writes: list[Write]
-):
+def test_the_doctor_offers_a_spare_and_adopts_it_with_fix(tmp_path, name, writes):
     with chain_of(tmp_path, name) as chain:
         chain.renew(chain.setups[6])
         before = chain.places()
@@ -130,7 +128,7 @@ def test_the_doctor_offers_a_spare_and_adopts_it_with_fix(
 @commands
 @every
 def test_an_adoption_interrupted_between_id_and_rate_is_finished_by_a_second_run(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, name: str, words: tuple[str, ...]
+    monkeypatch, tmp_path, name, words
 ):
     write = Transactions.write
 
@@ -161,23 +159,21 @@ def is_refused(chain: Chain, writes: list[Write], *words: str) -> bool:
 
 
 @every
-def test_two_missing_servos_are_named_and_none_is_replaced(
-    tmp_path: Path, name: str, writes: list[Write]
-):
+def test_two_missing_servos_are_named_and_none_is_replaced(tmp_path, name, writes):
     with chain_of(tmp_path, name, command="lose 9") as chain:
         chain.renew(chain.setups[6])
         named = "neck_yaw, neck_roll (servos 7, 9): does not answer"
         assert is_refused(chain, writes, named, "is none of the missing (neck_yaw (servo 7): ")
 
 
-def test_a_spare_of_another_model_is_named(tmp_path: Path, writes: list[Write]):
+def test_a_spare_of_another_model_is_named(tmp_path, writes):
     small = ServoSpec(20, "xl330-m077")
     with chain_of(tmp_path, "desk", small, command="lose 7") as chain:
         chain.renew(chain.setups[0]._replace(id=20))
         assert is_refused(chain, writes, "servo 1 (xl330-m077) answers at 57600 bit/s and is none")
 
 
-def test_a_servo_whose_answer_was_lost_is_not_replaced(tmp_path: Path):
+def test_a_servo_whose_answer_was_lost_is_not_replaced(tmp_path):
     with chain_of(tmp_path, "desk") as chain:
         kind, baud = chain.kind, chain.baud
         line, factory = port_at_path(chain.path), kind.family.factory_baud

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import pi, sin
-from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
@@ -85,7 +84,7 @@ each = pytest.mark.parametrize("kind", list(KINDS))
 
 
 @each
-def test_a_sample_says_what_the_servos_say(kind: str):
+def test_a_sample_says_what_the_servos_say(kind):
     bench = Bench(kind)
     bench.registers().write(1, "goal_position", 2100)
     seen = bench.monitor.sample().servos
@@ -100,7 +99,7 @@ def test_a_sample_says_what_the_servos_say(kind: str):
 
 
 @each
-def test_nothing_is_ever_written(kind: str):
+def test_nothing_is_ever_written(kind):
     bench = Bench(kind)
     servo = cast(Any, bench.devices[""]).find_servo(1)
     before = bytes(servo.memory.bytes[:56])
@@ -116,7 +115,7 @@ def test_nothing_is_ever_written(kind: str):
 # --- boards
 
 
-def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees(maker_rig: Rig):
+def test_hobby_servos_show_their_pulse_and_what_it_would_be_in_degrees(maker_rig):
     bench = Bench(maker_rig)
     limp = bench.see("eyes_pan")
     assert limp.pulse_us == 0.0 and limp.position_deg is None and not limp.torque
@@ -166,7 +165,7 @@ class HandBench:
         return sample
 
 
-def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(desk_rig: Rig, tmp_path: Path):
+def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(desk_rig, tmp_path):
     bench = HandBench(desk_rig)
     switch_off(desk_rig.joints, bench.port)
 
@@ -188,7 +187,7 @@ def test_a_head_moved_by_hand_becomes_a_track_that_moves_it_so(desk_rig: Rig, tm
     assert np.abs(played[:, 2]).max() == 0.0  # the roll has not moved
 
 
-def test_torque_that_comes_on_ends_the_recording(desk_rig: Rig):
+def test_torque_that_comes_on_ends_the_recording(desk_rig):
     bench = HandBench(desk_rig)
     switch_off(desk_rig.joints, bench.port)
     left = iter(range(5))
@@ -202,7 +201,7 @@ def test_torque_that_comes_on_ends_the_recording(desk_rig: Rig):
         record_hand_motion(sample, bench.rig.clock, lambda: None, 2.0)
 
 
-def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off(desk_rig: Rig):
+def test_a_servo_that_does_not_let_go_is_named_and_all_others_are_off(desk_rig):
     bench = HandBench(desk_rig)
     registers = Transactions(bench.port, KINDS["dynamixel"].family)
     joints = desk_rig.joints

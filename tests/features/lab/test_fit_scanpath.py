@@ -1,7 +1,5 @@
 """The fit-scanpath command: recordings on disk -> a YAML that run takes, or one line why not."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from command_line import invoked
@@ -33,13 +31,13 @@ NAN = float("nan")
 
 
 @pytest.fixture
-def boxes(tmp_path: Path) -> PartBoxes:
+def boxes(tmp_path) -> PartBoxes:
     path = tmp_path / "parts.yaml"
     path.write_text(BOXES_YAML)
     return PartBoxes.read(path)
 
 
-def test_samples_become_fixations_of_parts(tmp_path: Path, boxes: PartBoxes):
+def test_samples_become_fixations_of_parts(tmp_path, boxes):
     """That a known walk comes back is tested where it is fitted: test_scanpath."""
     # 250 Hz, looks of a fifth of a second at two parts in turn, noise of 1.5 px, some lost.
     places = np.repeat([(300.0, 290.0), (400.0, 390.0)] * 50, 50, axis=0)
@@ -57,7 +55,7 @@ def test_samples_become_fixations_of_parts(tmp_path: Path, boxes: PartBoxes):
     assert "#   gaze.csv" in out.read_text()
 
 
-def test_labelled_fixations_are_taken_as_they_are(tmp_path: Path):
+def test_labelled_fixations_are_taken_as_they_are(tmp_path):
     looks = "start,duration,part\n" + "".join(
         f"{300 * k},250,{'N' if k % 2 else 'RE'}\n" for k in range(80)
     )
@@ -112,9 +110,7 @@ MAPPED = {"time": "Clock", "x": "horizontal", "y": "vertical"}
         (OWN, "utf-8", {**MAPPED, "time": "clock [us]"}, "column clock is in us (from its name)"),
     ],
 )
-def test_exports_of_trackers_are_read_by_their_own_columns(
-    tmp_path: Path, text: str, encoding: str, mapping: dict[str, str], note: str
-):
+def test_exports_of_trackers_are_read_by_their_own_columns(tmp_path, text, encoding, mapping, note):
     (tmp_path / "export.tsv").write_text(text, encoding=encoding)
     read = read_recording(tmp_path / "export.tsv", mapping)
     assert isinstance(read, Samples) and read.note == note
@@ -123,7 +119,7 @@ def test_exports_of_trackers_are_read_by_their_own_columns(
     assert read.y == pytest.approx([300.0, NAN, 300.25], nan_ok=True)
 
 
-def test_fixations_of_neon_have_places_and_columns_are_mapped(tmp_path: Path):
+def test_fixations_of_neon_have_places_and_columns_are_mapped(tmp_path):
     lines = ["start timestamp [ns],took_ms,fixation x [px],fixation y [px]"]
     for k in range(80):
         place = "400,390" if k % 2 else "300,290"
@@ -164,9 +160,7 @@ SAMPLE_ROWS = [f"{0.004 * k:.3f},400,400" for k in range(200)]
         ("\n".join(["time,x,y", *SAMPLE_ROWS]), "1 fixations on the face are too few"),
     ],
 )  # fmt: skip
-def test_files_that_cannot_be_trusted_are_refused(
-    tmp_path: Path, boxes: PartBoxes, text: str, why: str
-):
+def test_files_that_cannot_be_trusted_are_refused(tmp_path, boxes, text, why):
     recording, out = tmp_path / "bad.csv", tmp_path / "mine.yaml"
     recording.write_text(text)
     with pytest.raises(SetupError, match=why) as caught:

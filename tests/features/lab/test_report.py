@@ -6,7 +6,6 @@ from base64 import b64decode
 from dataclasses import replace
 from html import unescape
 from math import cos, radians, sin
-from pathlib import Path
 
 import cv2
 import numpy as np
@@ -76,7 +75,7 @@ def ticks(desk_rig: Rig) -> list[Tick]:
     return run_ticks(desk_rig, 15.0)
 
 
-def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(results: dict[str, MeasureResult]):
+def test_a_gaze_that_wanders_as_people_do_passes_on_the_face(results):
     for key in ("on_parts", "eyes_share", "visit", "never_taken", "heat", "rate",
                 "below_15", "peak_small", "rest_error", "in_cone",
                 "vergence_ok"):  # fmt: skip
@@ -126,9 +125,7 @@ def test_servos_without_bytes_are_not_judged():
         assert seen[key].verdict == "too few events"
 
 
-def test_the_whole_report_is_written(
-    walking: GazeTrace, results: dict[str, MeasureResult], tmp_path: Path
-):
+def test_the_whole_report_is_written(walking, results, tmp_path):
     from gazerig.features.lab.report.figures import DRAWINGS
     from gazerig.features.lab.report.report import ReportedRun, make_report
 
@@ -160,7 +157,7 @@ def test_the_whole_report_is_written(
 
 
 @pytest.mark.parametrize("name", ["notes.html", "notes_measures.json"])
-def test_a_report_writes_over_nothing_unless_forced(tmp_path: Path, name: str):
+def test_a_report_writes_over_nothing_unless_forced(tmp_path, name):
     (tmp_path / name).write_text("somebody's own")
     # Refused before any work: the recording is not there.
     done = invoked("report", "a.mcap", "--out", str(tmp_path / "notes.html"))
@@ -203,7 +200,7 @@ SIZES = (2.0, -3.0, 5.0, -8.0, 12.0, -20.0, 30.0, -30.0, 1.5, -10.0)
 
 
 @pytest.mark.parametrize("rate_hz", [100.0, 200.0, 250.0, 1000.0])
-def test_every_jump_is_found_with_its_size_time_and_speed(rate_hz: float):
+def test_every_jump_is_found_with_its_size_time_and_speed(rate_hz):
     found = jumps(stepped(trace(SIZES, rate_hz)), rate_hz)
     assert len(found) == len(SIZES)
     law = Jumps(SaccadeParams(profile="min_jerk")).profile
@@ -225,7 +222,7 @@ def test_a_jump_that_follows_at_once_is_one_of_its_own():
 
 
 @pytest.mark.parametrize("slow_deg_s", [10.0, 25.0, 45.0])
-def test_following_is_no_saccade_and_hides_none(slow_deg_s: float):
+def test_following_is_no_saccade_and_hides_none(slow_deg_s):
     assert len(jumps(stepped(trace((0.0,) * 4, 200.0, slow_deg_s)), 200.0)) <= 1  # its onset
     found = jumps(stepped(trace((0.0, 0.0, 4.0, -6.0, 8.0), 200.0, slow_deg_s)), 200.0)
     sizes = [jump.amplitude_deg for jump in found if jump.onset_s > 1.0]
@@ -290,7 +287,7 @@ turn_number 11; off_partner -1.3362 1.9202; face_edge 4.0475; measured 1; part 3
 way -.0099 .9949 .0999; plan .6 .8 0"""
 
 
-def test_a_row_says_where_eyes_head_and_faces_are(ticks: list[Tick]):
+def test_a_row_says_where_eyes_head_and_faces_are(ticks):
     tick = structs.replace(ticks[-1], t_s=10.0)
     assert tick.percept is not None
     seen = structs.replace(tick.percept.faces[0], **yaml.decode(FACE))
@@ -306,7 +303,7 @@ def test_a_row_says_where_eyes_head_and_faces_are(ticks: list[Tick]):
         assert np.atleast_1d(row[name]) == pytest.approx(np.array(due, float), abs=2e-4), name
 
 
-def test_what_is_not_measured_or_stopped_and_a_gap_make_no_events(ticks: list[Tick]):
+def test_what_is_not_measured_or_stopped_and_a_gap_make_no_events(ticks):
     builder = GazeTraceBuilder()
     for tick in ticks[:2000]:
         joints = structs.replace(tick.joints, missing=("left_eye_pan",))

@@ -44,7 +44,7 @@ def alone(desk_rig: Rig) -> list[Row]:
     return [run_row(desk_rig, replace(OPTIONS, seed=seed), point) for point, seed in RUNS]
 
 
-def test_a_run_that_fails_is_a_row_with_its_reason(tmp_path: Path):
+def test_a_run_that_fails_is_a_row_with_its_reason(tmp_path):
     out = tmp_path / "grid.csv"
     done = swept(out, "--set", f"{LOW}=-25.0,0.0", "--set", f"{HIGH}=0.0,25.0", "--seeds", "1")
     assert done.code == 0, done.err
@@ -61,7 +61,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason(tmp_path: Path):
     assert swept(out, "--set", f"{LOW}=-25.0,0.0").code == 2  # the table is kept
 
 
-def test_two_processes_make_the_table_of_one(desk_rig: Rig, alone: list[Row]):
+def test_two_processes_make_the_table_of_one(desk_rig, alone):
     counts: list[int] = []
     with open_executor(2, None) as pool:
         rows = run_all(pool, desk_rig, OPTIONS, RUNS, lambda: None, counts.append)
@@ -69,7 +69,7 @@ def test_two_processes_make_the_table_of_one(desk_rig: Rig, alone: list[Row]):
     assert counts[-1] == len(RUNS)
 
 
-def test_ctrl_c_leaves_the_rows_of_what_is_finished(desk_rig: Rig, alone: list[Row]):
+def test_ctrl_c_leaves_the_rows_of_what_is_finished(desk_rig, alone):
     counts: list[int] = []
     with ThreadPoolExecutor(1) as pool:
         stopped = lambda: "SIGINT" if counts and counts[-1] else None  # noqa: E731
@@ -82,7 +82,7 @@ def test_ctrl_c_leaves_the_rows_of_what_is_finished(desk_rig: Rig, alone: list[R
 
 
 @pytest.fixture
-def cluster(tmp_path: Path) -> Iterator[tuple[str, list["subprocess.Popen[bytes]"]]]:
+def cluster(tmp_path) -> Iterator[tuple[str, list["subprocess.Popen[bytes]"]]]:
     """Start a scheduler here and two workers; return its address and the workers."""
     distributed = pytest.importorskip("distributed")
     words = "-m", "distributed.cli.dask_worker", "--no-nanny", "--no-dashboard", "--nthreads", "1"
@@ -100,9 +100,7 @@ def cluster(tmp_path: Path) -> Iterator[tuple[str, list["subprocess.Popen[bytes]
                 process.wait()
 
 
-def test_a_worker_that_is_killed_loses_no_run_and_repeats_none(
-    cluster: tuple[str, list["subprocess.Popen[bytes]"]], desk_rig: Rig, alone: list[Row]
-):
+def test_a_worker_that_is_killed_loses_no_run_and_repeats_none(cluster, desk_rig, alone):
     address, workers = cluster
     killed: list[int] = []
 
@@ -143,12 +141,12 @@ def test_steps_and_lists_are_every_combination():
         (["profile=mitake"], "give --profile"),
     ],
 )
-def test_settings_of_no_form_are_refused(settings: list[str], why: str):
+def test_settings_of_no_form_are_refused(settings, why):
     with pytest.raises(SetupError, match=why):
         grid(settings, read_value)
 
 
-def test_keys_and_values_that_no_point_may_have_are_refused(desk_rig: Rig):
+def test_keys_and_values_that_no_point_may_have_are_refused(desk_rig):
     check_points(desk_rig, grid([f"{BLINKING}=-3,8"], read_value))
     for setting in ("gaze.lids.blinks_per_minute=8,9", f"{BLINKING}=-3,-2"):
         with pytest.raises(ConfigError, match="blinks_per_min"):

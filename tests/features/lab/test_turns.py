@@ -53,7 +53,7 @@ def model_alone(role: Role) -> GazeTrace:
 
 
 @pytest.mark.parametrize("role", get_args(Role))
-def test_looks_away_have_the_share_rate_and_direction_of_people(role: Role):
+def test_looks_away_have_the_share_rate_and_direction_of_people(role):
     for one in measures(model_alone(role)):
         if one.key.endswith(role) or (one.key in ("turn_begins", "turn_ends") and len(one.rows)):
             assert judge(one, interval=False).verdict == "pass", one.key

@@ -46,7 +46,7 @@ participants: 2
 
 
 @pytest.fixture
-def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def study(tmp_path, monkeypatch) -> Path:
     """A study of two films of two seconds, of which a quarter is shown and is enough."""
 
     def draw(study: Study, key: str, path: Path, progress: object) -> None:
@@ -63,7 +63,7 @@ def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def program(tmp_path: Path) -> Any:
+def program(tmp_path) -> Any:
     """Starts ``gazerig study run`` at one address; kills it at the end."""
     started: list[Program] = []
     address = f"127.0.0.1:{free_port()}"
@@ -102,7 +102,7 @@ Start = Callable[..., Program]
 
 
 @pytest.mark.parametrize("n", range(2, 7))
-def test_orders_balance_positions_and_successors(n: int):
+def test_orders_balance_positions_and_successors(n):
     rows = williams(n)
     each = len(rows) // n
     assert all(set(Counter(column).values()) == {each} for column in zip(*rows, strict=True))
@@ -110,7 +110,7 @@ def test_orders_balance_positions_and_successors(n: int):
     assert len(successors) == n * (n - 1) and set(successors.values()) == {each}
 
 
-def test_pairs_are_seen_in_both_orders(tmp_path: Path):
+def test_pairs_are_seen_in_both_orders(tmp_path):
     path = tmp_path / "pairs.yaml"
     path.write_text(
         "title: Pairs\ntask: pairwise\nquestionnaires: [choice]\nparticipants: 12\n"
@@ -129,7 +129,7 @@ def faults(path: Path, text: str) -> list[str]:
     return [f"{fault.line} {fault.key}" for fault in caught.value.faults]
 
 
-def test_faults_name_line_and_key(study: Path):
+def test_faults_name_line_and_key(study):
     text = study.read_text()
     both = text.replace("title: Short", "titel: Short").replace("seconds: 2", "seconds: 1")
     assert {"1 titel", "5 trials.seconds"} <= set(faults(study, both))
@@ -150,7 +150,7 @@ def test_conditions_rank_by_their_chain_of_hypotheses():
 
 
 @pytest.mark.parametrize("name", shipped_names("studies", HOME))
-def test_shipped_studies_find_their_effects_in_simulated_answers(name: str, tmp_path: Path):
+def test_shipped_studies_find_their_effects_in_simulated_answers(name, tmp_path):
     study = load_study(name)
     folder = StudyFolder(tmp_path / "data")
     simulate_study(study, folder, 24, 1, effect=1.5)
@@ -165,7 +165,7 @@ def test_shipped_studies_find_their_effects_in_simulated_answers(name: str, tmp_
             simulate_study(study, folder, 1, 1)
 
 
-def test_answers_that_do_not_count(study: Path, tmp_path: Path):
+def test_answers_that_do_not_count(study, tmp_path):
     from gazerig.features.study.report import answers_csv  # loads matplotlib
 
     loaded, folder = load_study(str(study)), StudyFolder(tmp_path / "data")
@@ -194,13 +194,13 @@ def test_answers_that_do_not_count(study: Path, tmp_path: Path):
 
 
 @pytest.fixture
-def journal(tmp_path: Path) -> Iterator[Journal]:
+def journal(tmp_path) -> Iterator[Journal]:
     journal = Journal(tmp_path / "data")
     yield journal
     journal.close()
 
 
-def test_a_head_that_is_held_for_more_than_a_second_ends_the_session(study: Path, journal: Journal):
+def test_a_head_that_is_held_for_more_than_a_second_ends_the_session(study, journal):
     state = SimpleNamespace(stopped="", level="hold", reasons=("a program jogs",))
     clock = iter((0.0, 0.9, 1.1))
     head: Any = SimpleNamespace(state=state)
@@ -210,7 +210,7 @@ def test_a_head_that_is_held_for_more_than_a_second_ends_the_session(study: Path
         one.poll()
 
 
-def test_pages_do_not_distinguish_conditions(study: Path, journal: Journal):
+def test_pages_do_not_distinguish_conditions(study, journal):
     session = session_of(study, journal)
     assert "difference" not in json.dumps(session.page_json())
     events_of = events(session)
@@ -218,7 +218,7 @@ def test_pages_do_not_distinguish_conditions(study: Path, journal: Journal):
     assert session.page_json()["debriefing"] == ("It was the difference.",)
 
 
-def test_an_incomplete_last_line_is_dropped(tmp_path: Path, study: Path):
+def test_an_incomplete_last_line_is_dropped(tmp_path, study):
     journal = Journal(tmp_path / "data")
     session_of(study, journal)
     with pytest.raises(SetupError, match="another program"):
@@ -234,7 +234,7 @@ def test_an_incomplete_last_line_is_dropped(tmp_path: Path, study: Path):
         Journal(tmp_path / "data")
 
 
-def test_a_design_does_not_change_after_the_first_participant(study: Path, tmp_path: Path):
+def test_a_design_does_not_change_after_the_first_participant(study, tmp_path):
     folder = StudyFolder(tmp_path / "data")
     folder.claim(load_study(str(study)))
     journal = Journal(folder.participant(1))
@@ -247,7 +247,7 @@ def test_a_design_does_not_change_after_the_first_participant(study: Path, tmp_p
 
 
 @pytest.mark.pty
-def test_a_killed_session_resumes_with_every_answer(study: Path, program: Start):
+def test_a_killed_session_resumes_with_every_answer(study, program):
     first = program(str(study))
     assert first.do(first.page(), "consent") == 200
     assert first.fetch("/film/x")[0] == 404
@@ -280,7 +280,7 @@ def _see_film(one: Program) -> None:
 
 
 @pytest.mark.pty
-def test_a_session_with_a_live_head(tmp_path: Path, program: Start):
+def test_a_session_with_a_live_head(tmp_path, program):
     path = tmp_path / "head.yaml"
     shipped = (HOME / "studies" / "nakamoto_2.yaml").read_text()
     shipped = shipped.replace("rig: expressive", f"rig: {at_rate(tmp_path, 'expressive', 50.0)}")
@@ -304,7 +304,7 @@ def test_a_session_with_a_live_head(tmp_path: Path, program: Start):
     assert again.process.wait(30) == 0
 
 
-def test_a_session_in_chromium_with_the_keyboard(study: Path, program: Start):
+def test_a_session_in_chromium_with_the_keyboard(study, program):
     one = program(str(study))
     with browsing() as tab:
 
@@ -343,7 +343,7 @@ def test_a_session_in_chromium_with_the_keyboard(study: Path, program: Start):
     assert [one.record.value for one in found.answers] == [4, 2, 4, 2, ""]
 
 
-def test_films_are_rendered_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_films_are_rendered_once(tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
     from gazerig.drivers.camera.film import Film
 

@@ -18,7 +18,7 @@ def s() -> Any:
     return analyse
 
 
-def test_p_values_equal_those_of_pingouin(s: Any):
+def test_p_values_equal_those_of_pingouin(s):
     for one in json.loads((GOLDEN / "study_p_values.json").read_text())["sets"]:
         rows, figures = np.array(one["ratings"]), one["pingouin"]
         than, better = rows[:, 0].astype(float), rows[:, 1].astype(float)
@@ -33,7 +33,7 @@ def test_p_values_equal_those_of_pingouin(s: Any):
         )
 
 
-def test_exact_p_values_are_those_of_all_signs(s: Any):
+def test_exact_p_values_are_those_of_all_signs(s):
     rng = np.random.default_rng(5)
     for _ in range(20):
         scores = rng.integers(-6, 7, 8) / 2.0
@@ -43,6 +43,6 @@ def test_exact_p_values_are_those_of_all_signs(s: Any):
         assert s.exact_sign_p(scores) == pytest.approx(min(1.0, 2.0 * min(above, below)))
 
 
-def test_holms_correction(s: Any):
+def test_holms_correction(s):
     assert s.correct_p_values([0.01, 0.04, 0.03]) == pytest.approx([0.03, 0.06, 0.06])
     assert s.correct_p_values([0.9, 0.8]) == [1.0, 1.0]

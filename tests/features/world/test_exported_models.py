@@ -22,7 +22,7 @@ def exported(rig: Rig) -> Any:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_masses_of_a_urdf_are_those_of_the_mjcf_and_possible(mujoco: Any, name: str):
+def test_masses_of_a_urdf_are_those_of_the_mjcf_and_possible(mujoco, name):
     """As MuJoCo's importer reads them."""
     rig = load_rig(name)
     text = urdf(description_of(rig), looks=False)

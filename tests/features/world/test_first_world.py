@@ -15,7 +15,7 @@ class Free:
 
 
 @pytest.fixture(autouse=True)
-def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
+def quiet(monkeypatch) -> None:
     figures = lambda software: ComputerFigures(2, 0.0, 1.0, software)  # noqa: E731
     monkeypatch.setattr(first_world, "measure", figures)
 
@@ -23,9 +23,7 @@ def quiet(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     ("name", "level"), [("llvmpipe (LLVM 15.0.6, 256 bits)", "small"), ("Mesa Intel UHD", "full")]
 )
-def test_the_room_where_it_can_be_rendered(
-    name: str, level: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_the_room_where_it_can_be_rendered(name, level, monkeypatch, capsys):
     monkeypatch.setattr(first_world, "find_spec", lambda name: object())
     monkeypatch.setattr(first_world, "open_context", lambda make: (Free(), name))
     main()
@@ -39,9 +37,7 @@ def none(make: object) -> object:
 @pytest.mark.parametrize(
     ("spec", "why"), [(None, install_command("world")), (object(), "egl: it is missing")]
 )
-def test_one_line_says_what_is_missing(
-    spec: object, why: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_one_line_says_what_is_missing(spec, why, monkeypatch, capsys):
     monkeypatch.setattr(first_world, "load_level", lambda figures: "small")
     monkeypatch.setattr(first_world, "find_spec", lambda name: spec)
     monkeypatch.setattr(first_world, "open_context", none)

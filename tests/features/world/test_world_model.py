@@ -22,7 +22,7 @@ def model_with(name: str, path: Path | None = None) -> Any:
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_every_shipped_rig_stands_in_a_world_at_its_first_angles(name: str):
+def test_every_shipped_rig_stands_in_a_world_at_its_first_angles(name):
     """Joints of a world are the rig's, one shaft a servo."""
     from gazerig.features.world.physics import World
 
@@ -38,7 +38,7 @@ def _world_file(folder: Path, inside: str) -> Path:
     return path
 
 
-def test_a_users_world_carries_the_head_at_its_site(mujoco: Any, tmp_path: Path):
+def test_a_users_world_carries_the_head_at_its_site(mujoco, tmp_path):
     """The site is the place of the neck base."""
     path = _world_file(tmp_path, '<site name="gazerig" pos="1 2 3"/>')
     model = model_with("desk", path)
@@ -47,7 +47,7 @@ def test_a_users_world_carries_the_head_at_its_site(mujoco: Any, tmp_path: Path)
     assert data.body("rig_neck_pitch_link").xpos == pytest.approx((1.0, 2.0, 3.07))
 
 
-def test_a_users_world_without_a_place_for_the_head_is_refused(tmp_path: Path):
+def test_a_users_world_without_a_place_for_the_head_is_refused(tmp_path):
     """The message has the file and the line to add."""
     path = _world_file(tmp_path, '<geom size="1"/>')
     with pytest.raises(SetupError, match=r'own\.xml: no place.*<site name="gazerig"'):
@@ -65,7 +65,7 @@ def test_a_users_world_without_a_place_for_the_head_is_refused(tmp_path: Path):
         ),
     ),
 )
-def test_a_users_world_that_cannot_be_used_is_one_line(tmp_path: Path, text: str, why: str):
+def test_a_users_world_that_cannot_be_used_is_one_line(tmp_path, text, why):
     """MuJoCo's own message follows."""
     path = tmp_path / "own.xml"
     path.write_text(text)

@@ -2,7 +2,6 @@
 
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -24,19 +23,19 @@ ASKED = RunOptions(mock=True, world="living-room")
         ({"world": None, "no_pictures": True}, "--no-pictures needs --world"),
     ],
 )
-def test_what_does_not_fit_is_refused(changes: dict[str, object], why: str):
+def test_what_does_not_fit_is_refused(changes, why):
     with pytest.raises(SetupError, match=why):
-        replace(ASKED, **changes).check_and_complete()  # type: ignore[arg-type]
+        replace(ASKED, **changes).check_and_complete()
 
 
-def test_a_missing_package_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch):
+def test_a_missing_package_says_how_to_install_it(monkeypatch):
     monkeypatch.setattr("gazerig.features.world.run.run_world.find_spec", lambda name: None)
     missing = re.escape(f"mujoco is not installed: {install_command('world')}")
     with pytest.raises(SetupError, match=missing):
         world_of(load_rig("desk"), ASKED)
 
 
-def test_a_world_that_is_not_there_is_said_with_those_that_are(tmp_path: Path):
+def test_a_world_that_is_not_there_is_said_with_those_that_are(tmp_path):
     rig = load_rig("desk")
     with pytest.raises(ConfigError, match="living-room"):
         world_of(rig, replace(ASKED, world="living-rom"))

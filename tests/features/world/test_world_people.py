@@ -1,8 +1,7 @@
 """People of a world are bodies: limbs keep their lengths, and nothing jumps."""
 
 from functools import cache
-from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -58,7 +57,7 @@ def angles_deg(a: Floats, b: Floats) -> Floats:
 
 
 @pytest.mark.parametrize("name", WORLDS)
-def test_limbs_keep_their_lengths(name: str):
+def test_limbs_keep_their_lengths(name):
     for who in people(name):
         body = figures(name).measures[who]
         for side in ("left", "right"):
@@ -70,7 +69,7 @@ def test_limbs_keep_their_lengths(name: str):
 
 
 @pytest.mark.parametrize("name", WORLDS)
-def test_nothing_jumps_also_where_a_round_begins_again(name: str):
+def test_nothing_jumps_also_where_a_round_begins_again(name):
     around = np.concatenate((film(name).p_m, film(name).p_m[:1]))
     moved = np.linalg.norm(np.diff(around, axis=0), axis=2).max(axis=0)
     for segment, away_m in zip(figures(name).names, moved.tolist(), strict=True):
@@ -88,7 +87,7 @@ right_upper_arm right_forearm z 151; right_forearm right_hand z 56; right_thigh 
 
 
 @pytest.mark.parametrize("name", WORLDS)
-def test_joints_stay_within_what_people_can_do(name: str):
+def test_joints_stay_within_what_people_can_do(name):
     for who in people(name):
         R = {segment: turns(name, f"{who}/{segment}") for segment in SEGMENTS}
         for row in LARGEST_DEG.strip().replace("\n", ";").split(";"):
@@ -108,7 +107,7 @@ def test_joints_stay_within_what_people_can_do(name: str):
 
 
 @pytest.mark.parametrize("name", WORLDS)
-def test_a_foot_that_stands_does_not_slide(name: str):
+def test_a_foot_that_stands_does_not_slide(name):
     for who in people(name):
         ankle_m = figures(name).measures[who].ankle_m
         for foot in ("left_foot", "right_foot"):
@@ -367,7 +366,7 @@ POSES = """
 """Time in s, segment, its place and quaternion (its first part > 0) in ten-thousandths."""
 
 
-def test_an_act_moves_every_limb_as_it_was_pinned(tmp_path: Path):
+def test_an_act_moves_every_limb_as_it_was_pinned(tmp_path):
     """Pinned, not derived: pin anew in the commit that moves a body otherwise on purpose."""
     path = tmp_path / "all_acts.yaml"
     path.write_text(SCRIPT)
@@ -387,7 +386,7 @@ _BETWEEN_M = 0.03
 
 
 @pytest.mark.parametrize("name", WORLDS)
-def test_people_stay_out_of_the_furniture_and_of_each_other(mujoco: Any, name: str):
+def test_people_stay_out_of_the_furniture_and_of_each_other(mujoco, name):
     from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.model import world_spec
 

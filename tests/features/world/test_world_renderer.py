@@ -104,7 +104,7 @@ def visible(R: Mat3, p_m: Vec3) -> Floats:
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_a_point_lands_where_the_programs_own_lens_says(balls: Any, pose: tuple[Mat3, Vec3]):
+def test_a_point_lands_where_the_programs_own_lens_says(balls, pose):
     pixels = visible(*pose)
     assert len(pixels) >= 2
     seen = balls.draw(PinholeView(0.0, LENS, SIZE, *pose))
@@ -152,9 +152,7 @@ def pictures_of(look: int) -> Iterator[tuple[ImageArray, Floats]]:
     picture.close()
 
 
-def test_faces_of_all_looks_are_found_where_they_are(
-    pictures: list[tuple[ImageArray, Floats]],
-):
+def test_faces_of_all_looks_are_found_where_they_are(pictures):
     detector = MtcnnDetector(FaceDetectorParams())
     off_px = []
     for image, true_px in pictures:

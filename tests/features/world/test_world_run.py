@@ -44,9 +44,7 @@ def test_a_head_in_a_world_finds_the_person_there():
     assert made.figures["joint_faults"] == {}
 
 
-def test_without_a_renderer_the_run_ends_with_the_reason_and_the_remedy(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_without_a_renderer_the_run_ends_with_the_reason_and_the_remedy(monkeypatch):
     monkeypatch.setenv("MUJOCO_GL", "none")
     with pytest.raises(NoRenderer, match=r"No module named 'mujoco\.none'.*--no-pictures"):
         Run(load_rig("desk"), replace(FAST, no_pictures=False))
@@ -78,11 +76,11 @@ class Host:
 
 
 @pytest.fixture
-def host(tmp_path: Path) -> Host:
+def host(tmp_path) -> Host:
     return Host(tmp_path)
 
 
-def test_people_wait_until_a_client_has_spoken(host: Host):
+def test_people_wait_until_a_client_has_spoken(host):
     from gazerig.features.world.served_world import PUBLISH_MS
 
     host.serve(0.05, heard=False)
@@ -153,7 +151,7 @@ Pinned, not derived: pin anew in the commit that moves a boxer otherwise on purp
 """
 
 
-def test_the_fist_follows_within_its_limits(scene: WorldScene):
+def test_the_fist_follows_within_its_limits(scene):
     at = hands(scene)
     assert np.linalg.norm(np.diff(at, axis=0), axis=2).max() < 0.01 * MAX_M_S
     # The front fist is at its ordered place; a low one takes the other hand along.
@@ -171,7 +169,7 @@ def test_the_fist_keeps_its_acceleration_where_its_order_jumps():
     assert 0.9 * MAX_M_S2 < m_s2.max() <= MAX_M_S2 + 1e-6
 
 
-def test_the_script_takes_over_again_after_a_second(scene: WorldScene):
+def test_the_script_takes_over_again_after_a_second(scene):
     alone = hands(world_scene("boxing", 0), lambda t_s: None)
     at = hands(scene)
     assert (at[:100] == alone[:100]).all()
@@ -183,7 +181,7 @@ def test_the_script_takes_over_again_after_a_second(scene: WorldScene):
     assert alone[210:230, 0, 0].min() < 0.36 and at[190:200, 0, 0].min() > 0.6
 
 
-def test_the_recording_of_a_moved_opponent_repeats_to_the_bit(tmp_path: Path):
+def test_the_recording_of_a_moved_opponent_repeats_to_the_bit(tmp_path):
     def order(number: int, made: Run) -> None:
         if number % 5 == 0 and (p_m := path(0.01 * number)) is not None:
             made.robot.command(MoveOpponent(p_m))

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from math import radians
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -49,9 +48,7 @@ def _moves(bench: WorldBench, joint: str, ms: int) -> tuple[list[Any], list[Any]
         ("feetech", "neck_yaw", ()),
     ],
 )
-def test_a_step_is_as_that_of_servos_with_mechanics_of_their_own(
-    name: str, joint: str, gains: tuple[int, ...]
-):
+def test_a_step_is_as_that_of_servos_with_mechanics_of_their_own(name, joint, gains):
     """Position within 3 % of the step at every moment, peaks of speed and torque within 8 %."""
     world, own = _moves(_armed(name, joint, gains), joint, 400)
     assert max(abs(a[0] - b[0]) for a, b in zip(world, own, strict=True)) < 0.03 * STEP
@@ -89,7 +86,7 @@ def test_the_neck_goes_limp_and_falls_when_its_load_is_heavier_than_friction():
     assert servo.position_steps < held - 100 and servo.shaft.effort == 0.0
 
 
-def test_a_world_whose_numbers_run_away_says_so(tmp_path: Path):
+def test_a_world_whose_numbers_run_away_says_so(tmp_path):
     """MuJoCo would reset silently, and servos would see a joint jump."""
     from gazerig.features.world.physics import WorldUnstable
 
@@ -129,7 +126,7 @@ MOVE = 800
 
 
 @pytest.mark.parametrize("name", ["maker", "six_hobby"])
-def test_hobby_servos_follow_their_pulses_as_those_with_mechanics_of_their_own(name: str):
+def test_hobby_servos_follow_their_pulses_as_those_with_mechanics_of_their_own(name):
     """They need as long, and stop within their dead band."""
     bench = WorldBench(name)
     joint = bench.rig.names[0]

@@ -3,7 +3,6 @@
 import pickle
 from collections.abc import Sequence
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -38,7 +37,7 @@ def triangles(part: WorldPart) -> int:
 
 
 @pytest.mark.parametrize("world", WORLDS)
-def test_a_shipped_world_is_small_enough_for_a_browser(world: str):
+def test_a_shipped_world_is_small_enough_for_a_browser(world):
     from gazerig.robot.dashboard.view.world_view import part_glb, room_glbs
 
     found = shapes(world)
@@ -56,7 +55,7 @@ def _vertices(part: WorldPart) -> np.ndarray:
     return part.shape.vertices if isinstance(part.shape, TexturedMesh) else part.shape.mesh.vertices
 
 
-def test_everybody_is_where_mujoco_has_them(mujoco: Any):
+def test_everybody_is_where_mujoco_has_them(mujoco):
     from gazerig.features.world.figure_model import PeoplePlacer
     from gazerig.features.world.model import world_spec
 

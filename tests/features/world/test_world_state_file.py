@@ -1,14 +1,13 @@
 """States of a world between two processes."""
 
 import threading
-from pathlib import Path
 
 import numpy as np
 
 from gazerig.features.world.state_file import StateReader, StateWriter, WorldState
 
 
-def test_states_are_never_mixed(tmp_path: Path):
+def test_states_are_never_mixed(tmp_path):
     """A writer that never pauses: every state that is read holds one number throughout."""
     writer = StateWriter(tmp_path / "state", 64)
     reader = StateReader(tmp_path / "state")

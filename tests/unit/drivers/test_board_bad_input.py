@@ -9,7 +9,7 @@ from fakes.pty_bus import PtyBus
 from typer.testing import CliRunner
 
 from gazerig.robot.cli.main import app
-from gazerig.sim_mock.devices import Emulated, MaestroLine, Pca9685Line
+from gazerig.sim_mock.devices import MaestroLine, Pca9685Line
 
 PULSES = "hobby servos without pulses go to their parking place"
 
@@ -34,7 +34,7 @@ def jog(rig: str, *words: str) -> str:
         ("i2c-1", "i2c-99", "no I2C bus /dev/i2c-99: switch I2C on"),
     ],
 )  # fmt: skip
-def test_a_file_that_cannot_be_right(tmp_path: Path, was: str, written: str, reported: str):
+def test_a_file_that_cannot_be_right(tmp_path, was, written, reported):
     assert reported in jog(on_pca9685(tmp_path, SECTION.replace(was, written)))
 
 
@@ -46,7 +46,7 @@ def test_a_file_that_cannot_be_right(tmp_path: Path, was: str, written: str, rep
          "reached over an I2C bus such as /dev/i2c-1: write it under bus.port"),
     ],
 )  # fmt: skip
-def test_a_board_that_is_not_the_one(tmp_path: Path, device: Emulated, rig: str, reported: str):
+def test_a_board_that_is_not_the_one(tmp_path, device, rig, reported):
     with PtyBus() as bus:
         path = bus.start_device(device)
         assert reported in jog(on_pca9685(tmp_path) if rig == "pca9685" else rig, "--port", path)

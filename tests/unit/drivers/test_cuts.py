@@ -16,7 +16,7 @@ from gazerig.robot.perception.perception import Perception
 
 
 @pytest.mark.parametrize("seed", [0, 5])
-def test_e89_cuts_are_found_identities_end_there_and_nothing_else_is_one(seed: int):
+def test_e89_cuts_are_found_identities_end_there_and_nothing_else_is_one(seed):
     """Among pans, light that is switched off and on, noise and a hand before the lens."""
     rng = np.random.default_rng(seed)
     images, cuts = row.cut_film(rng)
@@ -48,7 +48,7 @@ def turned(*frames: tuple[float, int, int]) -> list[Percept]:
 
 
 @pytest.mark.parametrize(("turned_deg", "ends"), [(0.0, True), (2.0, True), (30.0, False)])
-def test_a_head_that_turned_sees_another_part_of_the_same_room(turned_deg: float, ends: bool):
+def test_a_head_that_turned_sees_another_part_of_the_same_room(turned_deg, ends):
     """Pictures of a saccade are as unlike as those about a cut; the joints distinguish them."""
     percepts = turned((0.0, 0, 0), (0.0, 0, 0), (turned_deg, 1, 0))
     ids = [[face.id for face in percept.faces] for percept in percepts]

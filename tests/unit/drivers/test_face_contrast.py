@@ -33,7 +33,7 @@ def test_an_image_with_contrast_is_left_as_it_is():
 
 
 @pytest.mark.parametrize("image", [paled(0.15), (0.12 * PHOTO).astype(np.uint8)])
-def test_a_pale_or_dark_one_gets_the_contrast_of_others(image: ImageArray):
+def test_a_pale_or_dark_one_gets_the_contrast_of_others(image):
     dark, bright = grey_range(improve_contrast(image)[..., 1])
     assert dark < 25.0 and 150.0 < bright < 256.0
 

@@ -70,9 +70,7 @@ def reading_of(*args: object, **kwargs: object) -> FacePose:
 
 
 @pytest.mark.parametrize(("yaw", "pitch", "roll", "at"), POSES)
-def test_pose_and_gaze_come_back(
-    yaw: float, pitch: float, roll: float, at: tuple[float, float, float]
-):
+def test_pose_and_gaze_come_back(yaw, pitch, roll, at):
     R, p = turned(radians(yaw), radians(pitch), radians(roll)), np.array(at)
     gaze = np.array((0.2, -0.1, -1.0)) / np.linalg.norm((0.2, -0.1, -1.0))
     reading = reading_of(R, p, gaze)
@@ -162,7 +160,7 @@ def test_the_percept_tells_gaze_lids_and_speech_and_a_blink_takes_no_look_away()
 
 
 @pytest.fixture
-def folder(monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(monkeypatch) -> Path:
     """Return the folder of models, that of the package."""
     assert _PACKAGE is not None and _PACKAGE.origin is not None
     data = Path(_PACKAGE.origin).parent / "data"
@@ -171,7 +169,7 @@ def folder(monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @NEEDS_NETWORKS
-def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none(folder: Path):
+def test_only_the_largest_faces_get_a_mesh_and_a_wall_gets_none(folder):
     shown = portrait("astronaut")
     face = DetectedFace((180.0, 63.0, 85.0, 109.0), shown.landmarks_px, 0.9)
 

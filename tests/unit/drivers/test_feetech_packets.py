@@ -83,7 +83,7 @@ def test_checksums_of_many_are_right_where_each_is(bodies):
 
 
 @pytest.mark.parametrize("stray", [b"\xff", b"\xff\xff", b"\x00\xff"])
-def test_a_stray_ff_before_an_answer_makes_it_no_other_servos(stray: bytes):
+def test_a_stray_ff_before_an_answer_makes_it_no_other_servos(stray):
     """FF FF FF 01 ...: the header is the last two of them, and 255 is no servo."""
     (found,) = parse_statuses(stray + b"\xff\xff\x01\x02\x00\xfc")
     assert found.id == 1 and found.intact

@@ -57,9 +57,7 @@ def steps(*parts: tuple[int, float]) -> list[float]:
         ("no-rate.webm", steps((20, 0.066), (20, 0.041), (20, 0.1))),
     ],
 )
-def test_each_picture_is_due_at_its_time_in_the_container(
-    tmp_path: Path, name: str, times_s: list[float]
-):
+def test_each_picture_is_due_at_its_time_in_the_container(tmp_path, name, times_s):
     codec = "libvpx" if name.endswith("webm") else "mpeg4"
     container_s = sorted(film_of(tmp_path / name, times_s, codec))
     film = Film(tmp_path / name)
@@ -73,7 +71,7 @@ def test_each_picture_is_due_at_its_time_in_the_container(
 
 
 @pytest.mark.parametrize("rotation", [0, 90, 180, -90])
-def test_a_film_is_turned_as_its_container_says(tmp_path: Path, rotation: int):
+def test_a_film_is_turned_as_its_container_says(tmp_path, rotation):
     film_of(tmp_path / "turned.mp4", steps((3, 0.1)), rotation=rotation)
     film = Film(tmp_path / "turned.mp4")
     film.open()
@@ -85,7 +83,7 @@ def test_a_film_is_turned_as_its_container_says(tmp_path: Path, rotation: int):
 
 
 @pytest.fixture(scope="module")
-def film_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def film_file(tmp_path_factory) -> Path:
     return write_film(tmp_path_factory.mktemp("films") / "film.avi", LENGTH, RATE_HZ, grey=10)
 
 
@@ -105,19 +103,19 @@ def refusal(path: Path) -> str:
     return message
 
 
-def test_absent_file_and_directory(tmp_path: Path):
+def test_absent_file_and_directory(tmp_path):
     assert "check the path" in refusal(tmp_path / "none.avi")
     assert "is a directory" in refusal(tmp_path)
 
 
 @pytest.mark.parametrize(("name", "content"), [("x.avi", b""), ("x1.png", b"some text\n")])
-def test_file_that_is_no_film(tmp_path: Path, content: bytes, name: str):
+def test_file_that_is_no_film(tmp_path, content, name):
     (tmp_path / name).write_bytes(content)
     assert "readable" in refusal(tmp_path / name)
 
 
 @pytest.mark.parametrize("name", ["cut.avi", "cut.webm", "cut.mp4"])
-def test_film_cut_short(tmp_path: Path, film_file: Path, name: str):
+def test_film_cut_short(tmp_path, film_file, name):
     content = film_file.read_bytes()
     if name != "cut.avi":
         film_of(tmp_path / name, steps((100, 0.04)), "libvpx" if "webm" in name else "mpeg4")
@@ -126,7 +124,7 @@ def test_film_cut_short(tmp_path: Path, film_file: Path, name: str):
     assert "cut short" in refusal(tmp_path / name)
 
 
-def test_damaged_pictures_are_skipped_and_told_once(tmp_path: Path):
+def test_damaged_pictures_are_skipped_and_told_once(tmp_path):
     file = tmp_path / "scratched.mp4"
     film_of(file, steps((100, 0.04)), "libx264")
     content = bytearray(file.read_bytes())
@@ -144,7 +142,7 @@ def test_damaged_pictures_are_skipped_and_told_once(tmp_path: Path):
 # ---- real time --------------------------------------------------------------------------
 
 
-def test_take_gives_the_newest_due_picture_at_its_time(film_file: Path):
+def test_take_gives_the_newest_due_picture_at_its_time(film_file):
     film, now = Film(film_file), [100.0]
     film.open()
     for now_s, due_s, number in ((100.0, 100.0, 1), (100.1, 100.1, 2), (100.85, 100.8, 9)):

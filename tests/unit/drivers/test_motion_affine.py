@@ -77,7 +77,7 @@ def test_every_number_of_a_thing_is_as_it_was_reviewed():
 
 @pytest.mark.parametrize("radius", [60, 20])
 @pytest.mark.parametrize("slide", [(60.0, 0.0), (120.0, -40.0), (-200.0, 30.0)])
-def test_slide_within_5_per_cent(radius: float, slide: tuple[float, float]):
+def test_slide_within_5_per_cent(radius, slide):
     blobs = seen(radius, slide, 0.0, 0.0)
     speed = np.hypot(*slide)
     for blob in blobs:
@@ -92,7 +92,7 @@ def test_slide_within_5_per_cent(radius: float, slide: tuple[float, float]):
 
 @pytest.mark.parametrize("radius", [60, 40, 20])
 @pytest.mark.parametrize("spin", [2.0, -5.0, 10.0])
-def test_spin_within_10_per_cent(radius: float, spin: float):
+def test_spin_within_10_per_cent(radius, spin):
     blobs = seen(radius, (0.0, 0.0), spin, 0.0)
     assert np.median([blob.spin_rad_s for blob in blobs]) == pytest.approx(spin, rel=0.1)
     assert abs(np.median([blob.loom_1_s for blob in blobs])) < 0.2
@@ -100,7 +100,7 @@ def test_spin_within_10_per_cent(radius: float, spin: float):
 
 @pytest.mark.parametrize("radius", [60, 40])
 @pytest.mark.parametrize("loom", [0.5, 1.5, -1.0, 3.0])
-def test_loom_within_10_per_cent(radius: float, loom: float):
+def test_loom_within_10_per_cent(radius, loom):
     blobs = seen(radius, (0.0, 0.0), 0.0, loom)
     assert np.median([blob.loom_1_s for blob in blobs]) == pytest.approx(loom, rel=0.1)
     speeds = [blob.v_camera_m_s[2] for blob in blobs if blob.v_camera_m_s is not None]

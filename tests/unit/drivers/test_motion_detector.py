@@ -70,13 +70,13 @@ def test_depth_is_the_median_of_what_is_known():
 
 
 @pytest.mark.parametrize("depth_m", [np.full((240, 320), np.nan), np.zeros((0, 0))])
-def test_a_depth_picture_of_holes_is_none(depth_m: NDArray[np.float64]):
+def test_a_depth_picture_of_holes_is_none(depth_m):
     blob = last(FIVE, depth_m)
     assert not blob.depth_known and np.isfinite(blob.p_camera_m).all()
 
 
 @pytest.mark.parametrize("shape", [(1, 1), (47, 300), (3000, 64)])
-def test_pictures_too_small_or_narrow_are_silent(shape: tuple[int, int]):
+def test_pictures_too_small_or_narrow_are_silent(shape):
     detector = MotionDetector(MotionParams())
     for k in range(3):
         assert look(detector, np.full(shape, 9 * k, dtype=np.uint8), k * DT_S) == ()
@@ -92,7 +92,7 @@ def test_flow_needs_48_pixels_and_a_side_of_at_most_four_times_the_other():
 
 
 @pytest.mark.parametrize("level", [0, 255])
-def test_a_covered_lens_sees_nothing(level: int):
+def test_a_covered_lens_sees_nothing(level):
     detector = MotionDetector(MotionParams())
     for k in range(4):
         assert look(detector, np.full((240, 320, 3), level, dtype=np.uint8), k * DT_S) == ()
@@ -107,7 +107,7 @@ def test_noise_alone_is_nothing():
 
 
 @pytest.mark.parametrize("times", [(0.0, 0.0), (1.0, 0.5), (0.0, 5.0), (0.0, float("nan"))])
-def test_times_that_do_not_follow_are_not_compared(times: tuple[float, float]):
+def test_times_that_do_not_follow_are_not_compared(times):
     detector = MotionDetector(MotionParams())
     assert detector.before_s is None
     look(detector, scene(0), times[0])

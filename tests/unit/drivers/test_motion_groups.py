@@ -84,7 +84,7 @@ def test_first_sight_is_not_told_yet_and_a_flicker_never():
 
 
 @pytest.mark.parametrize(("gap", "same"), [(4, True), (8, False)])
-def test_who_pauses_is_remembered_for_a_while(gap: int, same: bool):
+def test_who_pauses_is_remembered_for_a_while(gap, same):
     tracks = MotionTracks()
     (one,) = follow(tracks, 0, (50, 50))
     for k in range(1, gap):

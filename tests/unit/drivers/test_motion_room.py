@@ -98,9 +98,7 @@ def watch(
     ("speed_deg_s", "gain", "lag_s"),
     [(0, 0.98, 0.01), (20, 0.98, 0.01), (60, 0.98, 0.01), (150, 0.98, 0.01), (150, 1.0, 0.0)],
 )
-def test_a_turning_head_in_a_still_room_sees_nothing_move(
-    speed_deg_s: float, gain: float, lag_s: float
-):
+def test_a_turning_head_in_a_still_room_sees_nothing_move(speed_deg_s, gain, lag_s):
     found, silent = watch(ramp(speed_deg_s), gain=gain, lag_s=lag_s)
     assert not any(found)
     assert silent.count("") >= 6
@@ -109,7 +107,7 @@ def test_a_turning_head_in_a_still_room_sees_nothing_move(
 @pytest.mark.parametrize(
     ("speed_deg_s", "known"), [(0, False), (20, True), (60, True), (60, False)]
 )
-def test_somebody_who_walks_is_seen_while_the_head_turns(speed_deg_s: float, known: bool):
+def test_somebody_who_walks_is_seen_while_the_head_turns(speed_deg_s, known):
     found, _ = watch(ramp(speed_deg_s), WALKER, known=known)
     assert all(len(blobs) == 1 for blobs in found[2:])
     blobs = [blobs[0] for blobs in found[2:]]
@@ -119,7 +117,7 @@ def test_somebody_who_walks_is_seen_while_the_head_turns(speed_deg_s: float, kno
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_a_thing_comes_in_at_the_side_of_a_camera_whose_turn_is_known(known: bool):
+def test_a_thing_comes_in_at_the_side_of_a_camera_whose_turn_is_known(known):
     found, _ = watch(
         ramp(20.0), Board((1.2, 0.1, 2.0), (0.25, 0.25), 1, speed_m_s=1.0), known=known
     )
@@ -127,7 +125,7 @@ def test_a_thing_comes_in_at_the_side_of_a_camera_whose_turn_is_known(known: boo
 
 
 @pytest.mark.parametrize("known", [True, False])
-def test_every_number_of_a_walker_is_as_it_was_reviewed(known: bool):
+def test_every_number_of_a_walker_is_as_it_was_reviewed(known):
     found, silent = watch(ramp(30.0), WALKER, known=known, depth_known=True, count=4)
     rows = [[x for x in astuple(blob)[2:] if x is not None] for blob in found[-1]]
     assert_reviewed(f"walker-{known}", [np.hstack(row).tolist() for row in rows])

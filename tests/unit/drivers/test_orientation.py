@@ -33,7 +33,7 @@ def axes(orientation: FrameOrientation) -> Floats:
 
 
 @pytest.mark.parametrize("orientation", ALL, ids=NAMES)
-def test_pixels_depth_and_lens_go_where_the_image_goes(orientation: FrameOrientation):
+def test_pixels_depth_and_lens_go_where_the_image_goes(orientation):
     rng = np.random.default_rng(3)
     image = rng.integers(0, 255, (HEIGHT, WIDTH, 3), np.uint8)
     depth = rng.random((HEIGHT, WIDTH)).astype(np.float32)
@@ -78,7 +78,7 @@ CENTRES = """-0.4 40 in, -0.6 40 out, 99.4 40 in, 99.6 40 out, 50 -0.4 in, 50 -0
 
 
 @pytest.mark.parametrize("centre", CENTRES.split(","))
-def test_a_face_whose_centre_is_outside_is_off_the_frame(centre: str):
+def test_a_face_whose_centre_is_outside_is_off_the_frame(centre):
     *place, found = centre.split()
     marks = np.array([(-5, -5), (5, -5), (0, 0), (-4, 5), (4, 5)]) + np.array(place, float)
     assert is_off_frame(DetectedFace((0, 0, 1, 1), marks, 1.0), 100, 80) == (found == "out")
@@ -86,7 +86,7 @@ def test_a_face_whose_centre_is_outside_is_off_the_frame(centre: str):
 
 @pytest.mark.parametrize("orientation", ALL, ids=NAMES)
 def test_e100_a_person_is_at_one_place_however_the_camera_is_mounted_and_whatever_its_size(
-    orientation: FrameOrientation,
+    orientation,
 ):
     """Sizes change from frame to frame, as a camera's may that another program sets."""
     direction, field_rad = np.array([0.2, -0.12, 1.0]), radians(69.0)
@@ -121,7 +121,7 @@ BENT_LENS = LensParams((640, 400), (480.0, 482.0), (327.0, 190.0), BENT.distorti
     k1=st.floats(-0.28, 0.3),
     p=st.floats(-0.003, 0.003),
 )
-def test_a_pixel_comes_back_through_its_ray(x: float, y: float, k1: float, p: float):
+def test_a_pixel_comes_back_through_its_ray(x, y, k1, p):
     lens = Intrinsics(480.0, 482.0, 327.0, 190.0, (k1, 0.05, p, -p, 0.0))
     found = project(rays([(x, y)], lens) * 2.5, lens)
     assert found[0] == pytest.approx((x, y), abs=1e-4)
@@ -140,9 +140,9 @@ def test_what_is_behind_the_camera_has_no_pixel():
 
 
 @pytest.mark.parametrize("distortion", [(0.0,) * 4, (0.0, 0.0, 0.0, 0.0, float("nan"))])
-def test_distortion_that_is_none_is_refused(distortion: tuple[float, ...]):
+def test_distortion_that_is_none_is_refused(distortion):
     with pytest.raises(ValueError, match="five finite numbers"):
-        Intrinsics(1.0, 1.0, 0.0, 0.0, distortion)  # type: ignore[arg-type]
+        Intrinsics(1.0, 1.0, 0.0, 0.0, distortion)
 
 
 def test_a_measured_lens_serves_every_picture_of_its_shape():

@@ -138,7 +138,7 @@ def test_a_palm_is_no_farther_than_its_person_unless_it_is_measured():
     "palm",
     [palm_at(P_PALM, 0.6), palm_at((0.1, 0.12, 1.5))],  # unsure; a neck
 )
-def test_what_is_hardly_a_palm_or_on_the_head_is_no_hand(palm: DetectedPalm):
+def test_what_is_hardly_a_palm_or_on_the_head_is_no_hand(palm):
     assert [places(percept) for percept in hands(palm)] == [[]] * 30
 
 
@@ -149,9 +149,7 @@ def test_what_is_hardly_a_palm_or_on_the_head_is_no_hand(palm: DetectedPalm):
     not (MODELS / PALMS.file).exists(), reason=f"needs {PALMS.file}: make test fetches it"
 )
 @pytest.mark.skipif(not FILM.exists(), reason=f"no {FILM}")
-def test_the_hands_of_a_person_who_signs_are_found_and_no_elbow(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_the_hands_of_a_person_who_signs_are_found_and_no_elbow(monkeypatch):
     """The one hand is at the forehead, the other before the chest."""
     monkeypatch.setenv(FOLDER_VARIABLE, str(MODELS))
     detector = add_body_detection(OneFace(), FaceDetectorParams(people_hz=0.0, hands_hz=30.0))

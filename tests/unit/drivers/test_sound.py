@@ -62,7 +62,7 @@ def ramp(seconds: float) -> PcmQueue:
 @pytest.mark.parametrize("late_s", [0.0, 0.008])
 @pytest.mark.parametrize("start_s", [-0.1, 0.0, 0.5])
 def test_each_sample_is_heard_at_its_time_also_if_the_start_is_late_or_requests_are(
-    start_s: float, late_s: float
+    start_s, late_s
 ):
     device = Loudspeaker()
     source = ramp(2.0)
@@ -115,7 +115,7 @@ def test_a_late_stream_loses_nothing_and_the_volume_is_a_factor():
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("sounds")
     tone = (9000 * np.sin(np.arange(16000) * 0.2)).astype(np.int16).tobytes()
     write_wav(folder / "good.wav", tone, 16000)
@@ -138,9 +138,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("slow.wav", "lasts 2 s, more than 1 s; divide it"),
     ],
 )
-def test_a_bad_file_is_one_message_with_its_name_and_the_remedy(
-    folder: Path, name: str, message: str
-):
+def test_a_bad_file_is_one_message_with_its_name_and_the_remedy(folder, name, message):
     with pytest.raises(SoundError) as told:
         check_sound(folder / name, 1.0)
     assert str(told.value).startswith(f"{folder / name}: ")
@@ -161,7 +159,7 @@ def test_espeak_reports_the_time_of_each_phoneme():
         speak("a mama", "xx-yy")
 
 
-def test_a_missing_library_and_bad_texts_are_one_message(monkeypatch: pytest.MonkeyPatch):
+def test_a_missing_library_and_bad_texts_are_one_message(monkeypatch):
     monkeypatch.setattr(espeak, "_LIBRARY", "none such")
     missing = espeak.synthesise("hello", "en-us")
     assert isinstance(missing, str) and missing.startswith("espeak-ng is not installed")
@@ -193,15 +191,13 @@ def wait_for(player: SoundPlayer, kind: str) -> SoundEvent:
     raise AssertionError(f"no event {kind}: {found}")
 
 
-def test_the_process_plays_files_and_streams_and_restarts_after_its_death(
-    player: SoundPlayer, folder: Path
-):
+def test_the_process_plays_files_and_streams_and_restarts_after_its_death(player, folder):
     clock = RealClock()
     player.play(str(folder / "good.wav"), 0.5, clock.now_s())
     assert player.position_s(clock.now_s()) is None
     wait_for(player, "started")
     positions = [player.position_s(clock.now_s()) for _ in range(1000)]
-    assert None not in positions and positions == sorted(positions)  # type: ignore[type-var]
+    assert None not in positions and positions == sorted(positions)
     wait_for(player, "ended")
     assert player.position_s(clock.now_s()) == pytest.approx(1.0, abs=0.01)
 
@@ -224,7 +220,7 @@ def test_the_process_plays_files_and_streams_and_restarts_after_its_death(
     wait_for(player, "started")
 
 
-def test_the_process_ends_with_its_link_and_names_a_missing_loudspeaker(folder: Path):
+def test_the_process_ends_with_its_link_and_names_a_missing_loudspeaker(folder):
     player = SoundPlayer("no such loudspeaker")
     player.play(str(folder / "good.wav"), 0.0, 0.0)
     reason = wait_for(player, "failed").reason
@@ -260,6 +256,6 @@ def test_the_process_ends_with_a_killed_program():
 
 
 @pytest.mark.parametrize(("rate_hz", "channels"), [(1000, 1), (16000, 3), (500_000, 1)])
-def test_a_stream_of_another_format_is_refused(player: SoundPlayer, rate_hz: int, channels: int):
+def test_a_stream_of_another_format_is_refused(player, rate_hz, channels):
     with pytest.raises(SoundError, match="give 1 or 2 channels at 8000..192000 Hz"):
         player.open_stream(rate_hz, channels, 0.0)

@@ -21,19 +21,19 @@ def written(path: Path, text: str, mode: int = 0o600) -> Path:
     return path
 
 
-def test_a_missing_file_gets_a_token_that_only_its_owner_can_read(tmp_path: Path):
+def test_a_missing_file_gets_a_token_that_only_its_owner_can_read(tmp_path):
     path = tmp_path / "token"
     token = read_token(path)
     assert len(token) >= 22 and path.stat().st_mode & 0o777 == 0o600
     assert read_token(path) == token != read_token(tmp_path / "other")
 
 
-def test_a_token_of_ones_own_is_read(tmp_path: Path):
+def test_a_token_of_ones_own_is_read(tmp_path):
     assert read_token(written(tmp_path / "token", f"{GOOD}\n", 0o400)) == GOOD
 
 
 @pytest.mark.parametrize("mode", [0o644, 0o640, 0o604, 0o620])
-def test_a_file_that_others_can_read_or_write_is_refused(tmp_path: Path, mode: int):
+def test_a_file_that_others_can_read_or_write_is_refused(tmp_path, mode):
     path = written(tmp_path / "token", GOOD, mode)
     with pytest.raises(SetupError, match=f"--token-file {path}: other users may read it"):
         read_token(path)
@@ -43,13 +43,13 @@ def test_a_file_that_others_can_read_or_write_is_refused(tmp_path: Path, mode: i
     "text",
     ["", "hello", GOOD[:21], "a" * 40, "abcabc" * 6, f"{GOOD} {GOOD}", GOOD + "é", "x" * 999],
 )
-def test_a_weak_token_is_refused(tmp_path: Path, text: str):
+def test_a_weak_token_is_refused(tmp_path, text):
     path = written(tmp_path / "token", text)
     with pytest.raises(SetupError, match="a token is 22 to 200 random letters.*remove it"):
         read_token(path)
 
 
-def test_what_is_no_file_is_refused(tmp_path: Path):
+def test_what_is_no_file_is_refused(tmp_path):
     os.mkfifo(tmp_path / "pipe", 0o600)
     for path, reason in (
         (tmp_path, "Is a directory|not a file"),
@@ -62,7 +62,7 @@ def test_what_is_no_file_is_refused(tmp_path: Path):
 
 @pytest.mark.usefixtures("ideal_servos")
 def test_an_address_is_told_without_a_token_that_is_kept_or_would_be_logged(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    tmp_path, monkeypatch, capsys
 ):
     line = "the page is at http://127.0.0.1:8080/?token=ab_c-D1"
     say_publicly(line)

@@ -6,7 +6,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from gazerig.config.schema import Rig
 from gazerig.robot.model.joint import JointParams, Linkage
 
 ROD = [[-30.0, 1900.0], [-10.0, 1640.0], [0.0, 1500.0], [15.0, 1350.0], [30.0, 1100.0]]
@@ -26,19 +25,19 @@ def curves(draw: st.DrawFn) -> Linkage:
 
 
 @given(curves(), st.floats(-2.0, 2.0))
-def test_there_and_back_is_where_one_was(curve: Linkage, angle_rad: float):
+def test_there_and_back_is_where_one_was(curve, angle_rad):
     assert curve.angle_rad(curve.steps(angle_rad)) == pytest.approx(angle_rad, abs=1e-9)
 
 
 @given(curves(), st.floats(-2.0, 2.0), st.floats(1e-4, 0.2))
-def test_a_larger_angle_is_farther_on_the_same_way(curve: Linkage, angle_rad: float, more: float):
+def test_a_larger_angle_is_farther_on_the_same_way(curve, angle_rad, more):
     climb = curve.steps(angle_rad + more) - curve.steps(angle_rad)
     assert (climb > 0.0) == curve.rising
     assert abs(climb) <= curve.steepest * more * (1.0 + 1e-6)
 
 
 @given(curves(), st.floats(-2.0, 2.0))
-def test_the_rate_is_the_slope_of_the_angle(curve: Linkage, angle_rad: float):
+def test_the_rate_is_the_slope_of_the_angle(curve, angle_rad):
     steps = curve.steps(angle_rad)
     rate = curve.rate_rad(steps)
     tiny = 1e-5 / abs(rate) * 1e-3
@@ -66,7 +65,7 @@ def test_measured_places_are_met_and_lines_lie_between():
         ([0.0, 0.1], [1.0, 1.0], "all increase or all decrease"),
     ],
 )
-def test_places_that_cannot_be_are_refused(angles: list[float], steps: list[float], words: str):
+def test_places_that_cannot_be_are_refused(angles, steps, words):
     with pytest.raises(ValueError, match=words):
         Linkage(angles, steps)
 
@@ -99,12 +98,12 @@ def test_a_hobby_joint_is_set_up_in_quarter_microseconds():
         ({"transmission_points": (), "zero_step": 2400}, "outside the servo's 500..2500 us"),
     ],
 )
-def test_a_joint_beyond_its_servo_or_its_measuring_is_refused(other: dict[str, object], words: str):
+def test_a_joint_beyond_its_servo_or_its_measuring_is_refused(other, words):
     with pytest.raises(ValueError, match=words):
         hobby(**other)
 
 
-def test_the_shipped_rods_give_every_joint_its_whole_range(maker_rig: Rig):
+def test_the_shipped_rods_give_every_joint_its_whole_range(maker_rig):
     for name, joint in maker_rig.joints.items():
         setup = joint.setup(name, 0.0)
         assert setup.max_steps - setup.min_steps > 4 * 250, name

@@ -29,7 +29,7 @@ GENTLE = 1.15
 
 
 @pytest.fixture(scope="module")
-def rigs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Rig]:
+def rigs(tmp_path_factory) -> dict[str, Rig]:
     folder = tmp_path_factory.mktemp("rig")
     return {name: rig_of(name, folder) for name in NAMES}
 
@@ -69,9 +69,7 @@ def judged(judge: Judge) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_true_joints_keep_range_speed_and_acceleration_whatever_is_wished(
-    rigs: dict[str, Rig], name: str
-):
+def test_true_joints_keep_range_speed_and_acceleration_whatever_is_wished(rigs, name):
     judged(driven(rigs[name], 1, gaps(0, 0.0, 1), 3.0))
 
 
@@ -82,9 +80,7 @@ def test_true_joints_keep_range_speed_and_acceleration_whatever_is_wished(
     share=st.sampled_from((0.01, 0.05, 0.2, 0.5)),
     longest=st.sampled_from((1, 2, 10, 400)),
 )
-def test_true_joints_keep_them_for_any_pattern_of_late_ticks(
-    rigs: dict[str, Rig], name: str, seed: int, share: float, longest: int
-):
+def test_true_joints_keep_them_for_any_pattern_of_late_ticks(rigs, name, seed, share, longest):
     judged(driven(rigs[name], seed, gaps(seed, share, longest), 2.0))
 
 
@@ -101,9 +97,7 @@ def where_from(rig: Rig, rng: np.random.Generator) -> dict[str, float]:
 
 @settings(max_examples=10, deadline=None, phases=DRAWN)
 @given(name=st.sampled_from(("desk", "feetech")), seed=st.integers(0, 10_000), again=st.booleans())
-def test_joints_come_from_anywhere_slowly_at_start_and_at_resume(
-    rigs: dict[str, Rig], name: str, seed: int, again: bool
-):
+def test_joints_come_from_anywhere_slowly_at_start_and_at_resume(rigs, name, seed, again):
     rig, rng = rigs[name], np.random.default_rng(seed)
     desired = restless(rig, seed, 60.0)(0.0)
     bench = Bench(rig, None if again else where_from(rig, rng))

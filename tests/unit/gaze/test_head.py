@@ -189,6 +189,14 @@ def test_e75_stahls_law_holds_for_any_range_and_is_lifted_where_the_eyes_cannot_
         assert place - short == pytest.approx(went, abs=1e-9)
 
 
+@settings(max_examples=100)
+@given(MODELS, EYES, PLACES, PLACES, INTERESTS, INTERESTS)
+def test_e65_less_interest_never_turns_the_head_further(model, eyes_deg, start, place, one, other):
+    less, more = sorted((one, other))
+    moved = [ends(model, eyes_deg, start, place, salience)[1] for salience in (less, more)]
+    assert moved[0] <= moved[1] + 1e-6
+
+
 @pytest.mark.parametrize("start", [-60.0, -20.0, 0.0, 35.0, 60.0])
 @pytest.mark.parametrize("place", [-60.0, -31.0, 0.0, 16.0, 25.0, 60.0])
 def test_e75_the_model_goes_as_far_as_the_report_expects_of_people(start, place):

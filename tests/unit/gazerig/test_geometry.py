@@ -9,7 +9,7 @@ import gazerig
 
 
 @pytest.mark.parametrize("rig", ["desk", "feetech", "maker"])
-def test_inverse_and_forward_meet(rig: str):
+def test_inverse_and_forward_meet(rig):
     point = (1.2, 0.15, 0.2)
     solved = gazerig.inverse(rig, point)
     assert solved.reachable and solved.error_deg < 1.0

@@ -4,7 +4,6 @@ import configparser
 import re
 import shutil
 import subprocess
-from pathlib import Path
 
 import pytest
 from papers import ROOT
@@ -21,7 +20,7 @@ UNIT = ROOT / "docs/gazerig.service"
 
 
 @pytest.mark.parametrize("rig", shipped_names("rigs"))
-def test_the_gaze_of_a_small_computer_is_that_of_any(rig: str):
+def test_the_gaze_of_a_small_computer_is_that_of_any(rig):
     small, plain = load_rig(rig, profile="small"), load_rig(rig)
     assert small.gaze == plain.gaze and small.ranges == plain.ranges
     assert small.loop.rate_hz == 100.0
@@ -47,7 +46,7 @@ def test_the_service_parks_before_anything_is_killed():
     assert "20 s" in PAPER and service["TimeoutStopSec"] == "20"
 
 
-def test_systemd_finds_no_fault_in_the_service(tmp_path: Path):
+def test_systemd_finds_no_fault_in_the_service(tmp_path):
     program = shutil.which("systemd-analyze")
     if program is None:
         pytest.skip("no systemd-analyze here")

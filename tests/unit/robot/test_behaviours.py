@@ -107,7 +107,7 @@ def begun(lived: Lived, action: str) -> list[float]:
     return [t_s for t_s, plan, before in changes if plan == action != before]
 
 
-def test_e46_a_a_punch_is_looked_at_and_guarded_against_in_time_and_nothing_else(boxing: Lived):
+def test_e46_a_a_punch_is_looked_at_and_guarded_against_in_time_and_nothing_else(boxing):
     figure = boxing.figure("punch")
     assert figure.of == 4
     assert latency(figure) <= 0.4
@@ -130,7 +130,7 @@ def test_e46_a_a_punch_is_looked_at_and_guarded_against_in_time_and_nothing_else
             assert actions(boxing, event.start_s, event.end_s) == ["wait"], event
 
 
-def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing: Lived):
+def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing):
     figure = boxing.figure("attack")
     assert figure.of == 3
     assert latency(figure) < 0.5
@@ -154,9 +154,7 @@ def test_e46_b_the_place_to_be_hit_is_looked_at_before_the_blow(boxing: Lived):
         assert any(p.start_s <= at_s <= p.end_s + 0.6 for p in punches)
 
 
-def test_e46_the_face_otherwise_a_waved_hand_and_a_feint_for_a_moment_and_who_reaches_in(
-    boxing: Lived,
-):
+def test_e46_the_face_otherwise_a_waved_hand_and_a_feint_for_a_moment_and_who_reaches_in(boxing):
     for event, of, share, within_s in (
         ("face", None, 0.6, 0.5),
         ("wave", 2, 0.0, 0.4),

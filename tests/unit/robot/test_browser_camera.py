@@ -159,7 +159,7 @@ def near() -> Iterator[Rig]:
         yield rig
 
 
-def test_pictures_come_in_one_at_a_time(near: Rig):
+def test_pictures_come_in_one_at_a_time(near):
     taken = taker(near)
     picture = jpeg()
     with near.knock("/api/v1/webcam") as line:
@@ -174,7 +174,7 @@ def test_pictures_come_in_one_at_a_time(near: Rig):
     assert len(taken) == 3
 
 
-def test_a_flood_of_pictures_is_thinned(near: Rig):
+def test_a_flood_of_pictures_is_thinned(near):
     taken = taker(near)
     with near.knock("/api/v1/webcam") as line:
         for _ in range(60):
@@ -183,7 +183,7 @@ def test_a_flood_of_pictures_is_thinned(near: Rig):
     assert 0 < len(taken) < 60
 
 
-def test_the_newest_browser_takes_over(near: Rig):
+def test_the_newest_browser_takes_over(near):
     near.take_picture = lambda data: True
     with near.knock("/api/v1/webcam") as first, near.knock("/api/v1/webcam") as second:
         second.send(jpeg())
@@ -203,7 +203,7 @@ navigator.mediaDevices.getUserMedia = async () => { throw new DOMException('no',
 """
 
 
-def test_the_button_sends_the_browsers_own_pictures_until_it_is_pressed_again(near: Rig):
+def test_the_button_sends_the_browsers_own_pictures_until_it_is_pressed_again(near):
     taken = taker(near)
     with browsing(drawing="0") as tab:
 
@@ -233,6 +233,6 @@ def test_the_button_sends_the_browsers_own_pictures_until_it_is_pressed_again(ne
         assert len(taken) == count
 
 
-def test_without_the_token_no_picture_comes_in(near: Rig):
+def test_without_the_token_no_picture_comes_in(near):
     with pytest.raises(Exception, match="403"):
         near.knock("/api/v1/webcam", Cookie=None)

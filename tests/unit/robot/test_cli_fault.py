@@ -12,7 +12,7 @@ from gazerig.sim_mock.devices import build
 
 
 @pytest.fixture
-def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
+def rig(monkeypatch) -> Iterator[TickedRig]:
     yield from connected(monkeypatch)
 
 
@@ -20,7 +20,7 @@ def with_faults(rig: TickedRig, fault: Callable[[str], str] | None) -> None:
     rig.made.bus = rig.made.bus._replace(inject_fault=fault)
 
 
-def test_a_command_reaches_the_emulated_servos_and_says_what_it_did(rig: TickedRig):
+def test_a_command_reaches_the_emulated_servos_and_says_what_it_did(rig):
     assert "xl330-m077" in SERVOS
     device = build(line_of("1-2:xl330-m077", 57600), lambda: 0.0)
     with_faults(rig, device.faults.command)
@@ -33,10 +33,10 @@ def test_a_command_reaches_the_emulated_servos_and_says_what_it_did(rig: TickedR
     assert device.positions_steps()[1] == pytest.approx(2048 - 30)
 
 
-def test_the_servos_of_a_run_obey(rig: TickedRig):
+def test_the_servos_of_a_run_obey(rig):
     assert "servo 1 does not answer" in gazerig("ctl", "fault", "lose", "1", "count", "3")
 
 
-def test_real_servos_take_none(rig: TickedRig):
+def test_real_servos_take_none(rig):
     with_faults(rig, None)
     assert REAL in gazerig("ctl", "fault", "lose", "2")

@@ -1,6 +1,5 @@
 """The list of the rigs that run: gazerig ctl rigs."""
 
-import pytest
 from ticked_rig import gazerig
 
 from gazerig.drivers.errors import DriverError
@@ -23,7 +22,7 @@ class Listed(RobotClient):
         pass
 
 
-def test_one_that_hangs_hides_no_other(monkeypatch: pytest.MonkeyPatch):
+def test_one_that_hangs_hides_no_other(monkeypatch):
     monkeypatch.setattr(ctl, "connect_to_all", lambda: [Listed(7, True), Listed(8, False)])
     listed = gazerig("ctl", "rigs")
     assert "process 7: does not answer" in listed and "left  8" in listed

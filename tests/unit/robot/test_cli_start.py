@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Iterator
 from importlib.metadata import version
-from pathlib import Path
 
 import pytest
 from command_line import typed
@@ -15,7 +14,7 @@ Terminal = pytest.CaptureFixture[str]
 
 
 @pytest.fixture(autouse=True)
-def as_before(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+def as_before(monkeypatch) -> Iterator[None]:
     """Return a terminal of one width; what --debug sets is for one command."""
     monkeypatch.setenv("COLUMNS", "120")
     logger = logging.getLogger(DEBUG_LOGGER)
@@ -24,7 +23,7 @@ def as_before(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     logger.setLevel(level)
 
 
-def test_gazerig_alone_shows_what_next_and_its_version_is_that_of_the_package(capfd: Terminal):
+def test_gazerig_alone_shows_what_next_and_its_version_is_that_of_the_package(capfd):
     assert typed() == 0
     shown = capfd.readouterr()
     assert "What next?" in shown.out and not shown.err
@@ -33,7 +32,7 @@ def test_gazerig_alone_shows_what_next_and_its_version_is_that_of_the_package(ca
     assert capfd.readouterr().out == f"gazerig {__version__}\n" == f"gazerig {version('gazerig')}\n"
 
 
-def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(tmp_path: Path, capfd: Terminal):
+def test_an_error_is_one_line_and_debug_shows_where_it_comes_from(tmp_path, capfd):
     assert typed("check", str(tmp_path / "none.yaml")) == 2
     short = capfd.readouterr().err
     assert len(short.strip().splitlines()) == 1

@@ -14,7 +14,7 @@ from gazerig.robot.model.commands import LookAt, LookAtPerson
         ("markov", "markov"), ("'1'", "1"), ("[1, 2.5]", (1, 2.5)), ("2026-01-31", "2026-01-31"),
     ],
 )  # fmt: skip
-def test_values_are_read_as_in_the_file(text: str, value: object):
+def test_values_are_read_as_in_the_file(text, value):
     read = read_value("key", text)
     assert read == value and type(read) is type(value)
 

@@ -1,7 +1,6 @@
 """Control by a client: its words, how long it lasts, and when it has arrived."""
 
 from math import degrees, radians
-from typing import Any
 
 import pytest
 from gaze_targets import target
@@ -14,7 +13,6 @@ from gazerig.robot.loop.head_state import head_state
 from gazerig.robot.model.commands import (
     Find,
     Jog,
-    Look,
     LookAt,
     LookAtDirection,
     LookAtPerson,
@@ -41,7 +39,7 @@ ASIDE = (radians(10.0), radians(-5.0))
         (LookAtPixel((200.4, 150.6)), "person", "look at pixel 200 151"),
     ],
 )
-def test_a_look_is_named_and_ends_with_the_next(look: Look, kind: str, words: str):
+def test_a_look_is_named_and_ends_with_the_next(look, kind, words):
     control = ClientControl(("jaw",))
     assert control.needs_camera and not control.has_target
     control.look(replace(look, who="ann"), 10.0, POINT)
@@ -85,7 +83,7 @@ HOT = replace(made_tick().guard_result, level="torque_off", critical_reasons=("j
          ("stopped", "stopped", "stopped")),
     ],
 )  # fmt: skip
-def test_who_controls_the_head_is_said(changes: Any, headline: str, gaze: tuple[str, ...]):
+def test_who_controls_the_head_is_said(changes, headline, gaze):
     state = head_state(made_tick(**changes))
     shown = state.gaze
     assert (state.headline, (shown.target, shown.phase, shown.kind)) == (headline, gaze)
@@ -103,9 +101,7 @@ def test_who_controls_the_head_is_said(changes: Any, headline: str, gaze: tuple[
         (Jog((("jaw", 0.1),), who="ann"), 1.0, "not renewed"),
     ],
 )
-def test_control_ends_when_it_is_not_renewed_or_its_time_is_over(
-    order: Any, lasts_s: float, why: str
-):
+def test_control_ends_when_it_is_not_renewed_or_its_time_is_over(order, lasts_s, why):
     control = ClientControl(("jaw", "neck"))
     for t_s in (10.0, 20.0):
         if isinstance(order, Jog):

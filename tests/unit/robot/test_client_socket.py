@@ -7,7 +7,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import aiohttp
-import pytest
 
 from gazerig.robot.dashboard.door import page_door
 from gazerig.robot.dashboard.door.client_socket import ClientSocket, Visitor, Wishes
@@ -17,9 +16,7 @@ def client(rate_hz: float = 0.0) -> ClientSocket:
     return ClientSocket(Wishes(rate_hz), Visitor("", "127.0.0.1"), "websocket 1")
 
 
-def test_a_stop_in_the_buffer_of_a_connection_that_is_closed_is_carried_out(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_a_stop_in_the_buffer_of_a_connection_that_is_closed_is_carried_out(monkeypatch):
     """It is read late: the computer is busy, and much was sent before it."""
     monkeypatch.setattr(page_door, "REST_S", 0.02)
     stop = aiohttp.WSMessage(aiohttp.WSMsgType.TEXT, '{"do": "stop"}', None)

@@ -57,7 +57,7 @@ ORDERS: list[Command] = [
 
 
 @pytest.mark.parametrize("order", ORDERS, ids=str)
-def test_orders_cross_processes_and_recordings_as_they_are(order: Command):
+def test_orders_cross_processes_and_recordings_as_they_are(order):
     plain = msgspec.json.decode(msgspec.json.encode(order))
     assert check_command(msgspec.convert(plain, AnyCommand)) == check_command(order) == order
     assert isinstance(order, Tune) or read_request(plain) == order
@@ -79,7 +79,7 @@ REFUSED = yaml.safe_load(
         ({"do": "find", "sought": "anybdy"}, r"mean 'anybody'\?; find has sought \(left, right"),
     ],
 )
-def test_what_is_no_order_is_refused_with_place_and_rule(data: object, words: str):
+def test_what_is_no_order_is_refused_with_place_and_rule(data, words):
     with pytest.raises(ValueError, match=words):
         read_request(data)
 
@@ -94,7 +94,7 @@ def test_what_is_no_order_is_refused_with_place_and_rule(data: object, words: st
         (Say(" \n"), "a text without a word is no speech"),
     ],
 )
-def test_an_invalid_order_of_this_program_is_refused(order: Command, words: str):
+def test_an_invalid_order_of_this_program_is_refused(order, words):
     with pytest.raises(ValueError, match=words.replace("`.", r"`\$.")):
         check_command(order)
 
@@ -107,9 +107,7 @@ def fastest_rad_s(ticks: list[Tick]) -> Floats:
     return speeds.max(axis=0)
 
 
-def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(
-    running: Running,
-):
+def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(running):
     running.order(Stop("the space bar"))
     ticks = running.go(1.0)
     first = ticks[0]
@@ -124,7 +122,7 @@ def test_a_stop_takes_the_torque_off_within_one_tick_and_nothing_moves_after(
     assert running.count.stopped_by == "over"
 
 
-def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running):
+def test_resume_goes_on_slowly_from_where_the_joints_are(running):
     running.order(Resume())  # of nothing
     running.order(Stop("test"))
     before = running.go(2.0)[-1]
@@ -139,7 +137,7 @@ def test_resume_goes_on_slowly_from_where_the_joints_are(running: Running):
     assert ticks[-1].target.kind == "face"
 
 
-def test_a_run_that_ends_stopped_does_not_park(running: Running):
+def test_a_run_that_ends_stopped_does_not_park(running):
     running.order(Stop("test"))
     running.go(0.2)
     said: list[str] = []
@@ -149,7 +147,7 @@ def test_a_run_that_ends_stopped_does_not_park(running: Running):
     assert said == ["stopped by over: not parked, as it was stopped, torque off"]
 
 
-def test_a_stop_while_parking_is_obeyed_at_once(running: Running):
+def test_a_stop_while_parking_is_obeyed_at_once(running):
     robot, made = running.made.robot, running.made
     robot.command(Jog((("neck_yaw", radians(50.0)),), stay=True))
     running.go(2.0)
@@ -164,7 +162,7 @@ def test_a_stop_while_parking_is_obeyed_at_once(running: Running):
     assert not any(joints.torque) and degrees(joints.position_rad[YAW]) > 45.0
 
 
-def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running):
+def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running):
     held = running.ticks[-1].guard_result.command_rad
     running.order(Jog((("neck_yaw", radians(25.0)),), stay=True))
     ticks = running.go(2.0)
@@ -178,14 +176,14 @@ def test_a_jogged_joint_goes_there_slowly_while_the_others_hold(running: Running
     assert running.go(2.0)[-1].target.kind == "face"
 
 
-def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running: Running):
+def test_a_jog_beyond_the_end_is_refused_with_the_joints_range(running):
     with pytest.raises(ValueError, match=r"neck_yaw 180.0 deg is outside its range, -70..70 deg"):
         running.order(Jog((("neck_yaw", pi),)))
     running.order(Jog((("neck_yaw", radians(70.04)),)))  # a slider's rounding
     assert running.go(0.1)[0].controlled_by == "a client: neck_yaw at 70.0 deg"
 
 
-def test_unknown_menus_are_refused_when_asked(running: Running):
+def test_unknown_menus_are_refused_when_asked(running):
     with pytest.raises(ValueError, match="available: behaviour, conversation, lids"):
         running.order(Ask("mood", "x"))
     with pytest.raises(ValueError, match="available: wink left"):
@@ -200,7 +198,7 @@ def replied(running: Running, order: Command) -> str:
     return running.do(order)[0].refused
 
 
-def test_a_command_is_replied_to_when_its_tick_can_be_seen(running: Running):
+def test_a_command_is_replied_to_when_its_tick_can_be_seen(running):
     robot = running.made.robot
     orders: tuple[list[Command], ...] = (
         [Stop("a hand")],
@@ -218,7 +216,7 @@ def test_a_command_is_replied_to_when_its_tick_can_be_seen(running: Running):
         assert None not in [ticket.wait(0.0) for ticket in tickets]
 
 
-def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: Running):
+def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running):
     tickets = [
         running.made.robot.command(order)
         for order in (LookAt((1.0, 0.2, 0.3)), Jog((("neck_yaw", 0.2),)), Resume(confirmed=True))
@@ -233,7 +231,7 @@ def test_what_was_asked_for_before_a_stop_does_not_move_the_head_after(running: 
 # The client in control, and the duration
 
 
-def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running):
+def test_a_lead_that_nobody_renews_lapses_and_is_named(running):
     running.order(Jog((("neck_yaw", 0.3),), who="a show (process 7)"))
     ticks = running.go(1.5)
     assert ticks[0].controlled_by == "a show (process 7): neck_yaw at 17.2 deg"
@@ -251,7 +249,7 @@ def test_a_lead_that_nobody_renews_lapses_and_is_named(running: Running):
 # Floods
 
 
-def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Running):
+def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running):
     robot = running.made.robot
     with pytest.raises(ValueError, match="too many requests"):
         for _ in range(1000):
@@ -269,7 +267,7 @@ def test_orders_that_wait_are_bounded_and_a_stop_goes_before_them(running: Runni
 
 
 @pytest.mark.parametrize("frame", ["world", "head"])
-def test_a_direction_is_looked_in(running: Running, frame: Any):
+def test_a_direction_is_looked_in(running, frame):
     running.do(Jog((("neck_yaw", radians(15.0)),), stay=True), 2.0)
     before = running.go()[-1].pose
     asked = (radians(10.0), radians(-5.0))
@@ -282,11 +280,11 @@ def test_a_direction_is_looked_in(running: Running, frame: Any):
     assert ticks[-1].client_control.arrived
 
 
-def test_nobody_is_followed_who_is_not_seen(running: Running):
+def test_nobody_is_followed_who_is_not_seen(running):
     assert running.do(LookAtPerson(99))[0].refused.startswith("no visible person '99'; available: ")
 
 
-def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running: Running):
+def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running):
     tick = running.go()[-1]
     found = tick.detections
     assert found is not None and tick.percept is not None
@@ -305,8 +303,8 @@ def test_a_pixel_is_where_it_was_when_the_frame_was_taken(running: Running):
     assert norm(sub(near, head)) == pytest.approx(0.5, abs=0.1)
 
 
-def test_a_pixel_without_a_frame_is_refused(running: Running):
+def test_a_pixel_without_a_frame_is_refused(running):
     nothing: Any = lambda now_s: None  # noqa: E731
-    running.made.robot.camera.latest = nothing  # type: ignore[method-assign]
+    running.made.robot.camera.latest = nothing
     running.go()
     assert "no camera frame" in running.do(LookAtPixel((1.0, 1.0)))[0].refused

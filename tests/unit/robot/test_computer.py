@@ -28,9 +28,7 @@ CARD, SOFTWARE = False, True
         (1, 0.00, 1.00, SOFTWARE, "least"),
     ],
 )
-def test_the_level_of_a_computer(
-    cores: int, late: float, share: float, software: bool | None, level: str
-):
+def test_the_level_of_a_computer(cores, late, share, software, level):
     assert load_level(ComputerFigures(cores, late, share, software)) == level
 
 
@@ -45,10 +43,8 @@ def test_the_level_of_a_computer(
         ({"rate": 400.0}, 400.0),
     ],
 )
-def test_the_rate_of_a_level_and_the_option_that_overrides_it(
-    options: dict[str, object], rate_hz: float
-):
-    asked = RunOptions(mock=True, **options)  # type: ignore[arg-type]
+def test_the_rate_of_a_level_and_the_option_that_overrides_it(options, rate_hz):
+    asked = RunOptions(mock=True, **options)
     assert with_options(load_rig("desk"), asked.check_and_complete()).loop.rate_hz == rate_hz
 
 

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from commanded_robot import Running
 
 from gazerig.robot.cli.command_list import Commands
 from gazerig.robot.cli.run import has_desktop, report_faults
@@ -26,9 +25,7 @@ DESK = {"DISPLAY": ":0"}
         ({**DESK, "SSH_CONNECTION": "10.0.0.2 1 10.0.0.3 22"}, True, False),
     ],
 )
-def test_a_browser_is_opened_only_where_somebody_sees_it(
-    environ: dict[str, str], terminal: bool, opens: bool
-):
+def test_a_browser_is_opened_only_where_somebody_sees_it(environ, terminal, opens):
     assert has_desktop(environ, terminal) is opens
 
 
@@ -50,7 +47,7 @@ def test_the_list_of_commands_is_that_of_their_modules():
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
-def test_a_request_to_end_while_a_run_is_made_ends_it_in_order(number: signal.Signals):
+def test_a_request_to_end_while_a_run_is_made_ends_it_in_order(number):
     before = signal.signal(number, signal.SIG_DFL)
     tidied = False
     try:
@@ -65,7 +62,7 @@ def test_a_request_to_end_while_a_run_is_made_ends_it_in_order(number: signal.Si
         signal.signal(number, before)
 
 
-def test_the_status_line_shows_the_loop_and_the_bus_five_times_a_second(running: Running):
+def test_the_status_line_shows_the_loop_and_the_bus_five_times_a_second(running):
     figures: Any = SimpleNamespace(over_s=2.0, rate_hz=99.5, late_share=0.0)
     lines: list[str] = []
     line = StatusLine(lines.append, running.made.robot.body.bus.health, lambda: figures)

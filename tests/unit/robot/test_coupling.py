@@ -1,9 +1,7 @@
 """Two servos that move two joints together: geometry, servo limits, feedback, and a run."""
 
-from collections.abc import Callable
 from dataclasses import replace
-from math import degrees, radians
-from pathlib import Path
+from math import degrees, inf, radians
 from typing import Any
 from unittest.mock import Mock
 
@@ -20,7 +18,6 @@ from gazerig.robot.loop.body import CoupledServos
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.weight import HeadMassParams, MassParams
-from gazerig.robot.run.run import Run
 
 PITCH, ROLL = 35.0, 25.0
 COUPLING = CouplingParams("neck_pitch", "neck_roll", 1.5, 1.2)
@@ -40,9 +37,7 @@ def rig_with(coupling: CouplingParams) -> Rig:
         (replace(COUPLING, first="nek_pitch"), "no joint 'nek_pitch'; did you mean 'neck_pitch'? available: left"),
     ],
 )  # fmt: skip
-def test_a_range_that_the_servos_cannot_do_is_refused_with_its_corner(
-    coupling: CouplingParams, said: str
-):
+def test_a_range_that_the_servos_cannot_do_is_refused_with_its_corner(coupling, said):
     (fault,) = faults(rig_with(coupling))
     assert fault.startswith("couplings.neck") and said in fault
 
@@ -76,16 +71,14 @@ def test_one_servo_of_a_pair_speaks_for_both_joints():
     assert servos.share_feedback(later, released=True).torque == (True, True, True)
 
 
-def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
-    started: Callable[[Rig], Run],
-):
+def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(started):
     """Joints are measured where they are sent, through two servos that know of no joints."""
     rig = rig_with(COUPLING)
     made = started(rig)
     asked = (("neck_pitch", radians(20.0)), ("neck_roll", radians(-15.0)))
     made.robot.command(Jog(asked, stay=True))
     write: Any = Mock(wraps=made.robot.body.bus.write)
-    made.robot.body.bus.write = write  # type: ignore[method-assign]
+    made.robot.body.bus.write = write
     last = [degrees(angle) for angle in ticks(made, 500)[-1].joints.position_rad]
     at = dict(zip(rig.names, last, strict=True))
     assert at["neck_pitch"] == pytest.approx(20.0, abs=0.4)
@@ -96,7 +89,30 @@ def test_a_coupled_neck_goes_where_it_is_sent_and_the_emulator_sees_servos_only(
         assert goals[name] == pytest.approx(rig.joints[name].steps(angle), abs=1.0)
 
 
-def coupled_file(tmp_path: Path) -> str:
+def test_a_lost_servo_of_a_pair_makes_both_joints_stale(started):
+    rig = rig_with(COUPLING)
+    made = started(rig)
+    read = made.robot.body.bus.read
+    k = rig.names.index("neck_roll")
+
+    def silent(t_s: float) -> Feedback:
+        whole = read(t_s)
+        nothing = Feedback.create_missing(len(rig.names))
+        columns = [
+            (*column[:k], none[k], *column[k + 1 :])
+            for column, none in zip(whole[:9], nothing[:9], strict=True)
+        ]
+        return Feedback._make((*columns, whole.rearmed, (k,)))
+
+    made.robot.body.bus.read = silent
+    first, *_, tick = ticks(made, 60)
+    assert first.joints.missing == ("neck_pitch", "neck_roll")
+    held = {reason.partition(":")[0] for reason in tick.guard_result.reasons}
+    assert {"neck_pitch", "neck_roll"} <= held
+    assert inf > min(tick.joints.measured_s) > -inf
+
+
+def coupled_file(tmp_path) -> str:
     text = shipped_path("rigs", "feetech").read_text()
     text += "\ncouplings:\n  neck: {first: neck_pitch, second: neck_roll}\n"
     path = tmp_path / "coupled.yaml"
@@ -105,7 +121,7 @@ def coupled_file(tmp_path: Path) -> str:
 
 
 @pytest.mark.usefixtures("simulated_wires")
-def test_bring_up_of_a_coupled_neck(tmp_path: Path):
+def test_bring_up_of_a_coupled_neck(tmp_path):
     pytest.importorskip("gazerig.features.bringup")
     rig = coupled_file(tmp_path)
     assert "valid: rig 'feetech'" in invoked("check", rig).err

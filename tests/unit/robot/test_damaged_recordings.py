@@ -68,13 +68,13 @@ USES: dict[str, Callable[[Path], object]] = {
 
 
 @pytest.fixture(scope="module")
-def run(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+def run(tmp_path_factory) -> bytes:
     path = tmp_path_factory.mktemp("run") / "run.mcap"
     record(path, load_rig("desk"), 0.3)
     return path.read_bytes()
 
 
-def test_every_damage_is_refused_or_changes_nothing(run: bytes, tmp_path: Path):
+def test_every_damage_is_refused_or_changes_nothing(run, tmp_path):
     """Right is the whole run, or its beginning if the file is marked as incomplete."""
     file, results = tmp_path / "damaged.mcap", Counter[str]()
     file.write_bytes(run)

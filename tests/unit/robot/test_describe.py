@@ -30,7 +30,7 @@ from gazerig.robot.run.rig_description import (
 
 
 @pytest.fixture(scope="module")
-def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def written(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("described") / "deep" / "out"
     done = invoked("describe", "expressive", str(folder))
     assert done.code == 0, done.err
@@ -38,7 +38,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def test_all_files_are_read_by_others(written: Path):
+def test_all_files_are_read_by_others(written):
     import mujoco
     import trimesh
     import yourdfpy
@@ -74,7 +74,7 @@ def test_a_joint_has_the_torque_of_its_servo():
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_gltf_is_one_tree_of_named_nodes_with_the_joints_in_it(name: str):
+def test_gltf_is_one_tree_of_named_nodes_with_the_joints_in_it(name):
     from gazerig.robot.description.gltf import gltf
 
     description = description_of(shipped(name))
@@ -144,7 +144,7 @@ READERS = (_own, _in_mujoco, _in_mujoco_from_urdf, _in_yourdfpy)
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_shipped_rigs_move_alike_everywhere(name: str):
+def test_shipped_rigs_move_alike_everywhere(name):
     rig, rng = shipped(name), np.random.default_rng(3)
     description = description_of(rig)
     for _ in range(5):
@@ -154,7 +154,7 @@ def test_shipped_rigs_move_alike_everywhere(name: str):
 
 
 @pytest.mark.parametrize("name", SHIPPED)
-def test_the_whole_model_is_compiled_with_looks(name: str):
+def test_the_whole_model_is_compiled_with_looks(name):
     import mujoco
 
     description = description_of(shipped(name))
@@ -199,7 +199,7 @@ def mujoco_loads_nm(rig: Rig, angles: Mapping[str, float]) -> dict[str, float]:
 
 
 @pytest.mark.parametrize("name", ["desk", "feetech", "expressive"])
-def test_torques_are_those_of_mujoco(name: str):
+def test_torques_are_those_of_mujoco(name):
     rng = np.random.default_rng(4)
     weights = {"back": CounterweightParams(0.2, (-60.0, 5.0, 20.0))}
     rig = heavy(name, replace(REAL, counterweights=weights))
@@ -244,7 +244,7 @@ class Neck:
 
 
 @pytest.mark.parametrize("name", ["desk", "feetech"])
-def test_a_heavy_head_does_not_sag(name: str):
+def test_a_heavy_head_does_not_sag(name):
     rig = heavy(name)
     plain = Neck(rig, compensated=False)
     made_up = Neck(rig)
@@ -253,9 +253,7 @@ def test_a_heavy_head_does_not_sag(name: str):
         assert before < -0.35 and abs(after) < 0.25, (angle, before, after)
 
 
-def test_sag_is_made_up_for_without_a_jump_and_within_the_limits(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_sag_is_made_up_for_without_a_jump_and_within_the_limits(monkeypatch):
     neck = Neck(heavy("desk"))
     goals: list[int] = []
     write = neck.body.bus.write

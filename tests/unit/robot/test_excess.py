@@ -25,7 +25,7 @@ def test_a_bucket_gives_its_burst_and_then_its_rate():
         ([(100_001, 5.0)], True),
     ],
 )
-def test_two_hundred_refusals_in_a_second_are_enough(rows: list[tuple[int, float]], over: bool):
+def test_two_hundred_refusals_in_a_second_are_enough(rows, over):
     count = ExcessCount()
     for late, now_s in rows:
         count.add(late, now_s)

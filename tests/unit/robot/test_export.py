@@ -41,7 +41,7 @@ def eyes(t_s: float, yaw_deg: float, pitch_deg: float = 0.0, plan_deg: float = 0
     return replace(tick, gaze=replace(tick.gaze, gaze_point_world_m=ahead))
 
 
-def test_left_and_up_are_positive_and_the_head_carries_the_eyes(tmp_path: Path):
+def test_left_and_up_are_positive_and_the_head_carries_the_eyes(tmp_path):
     still = made_tick(0.0, (10.0, 5.0, 6.0, 5.0, *[0.0] * 5))
     turned = made_tick(0.1, (10.0, 0.0, 6.0, 0.0, 0.0, 0.0, 20.0, 0.0, 0.0))
     # Right ear down: what is to its left is now above.
@@ -70,7 +70,7 @@ LOST = {
 }  # fmt: skip
 
 
-def test_cells_of_silent_servos_and_of_joints_that_a_rig_lacks_are_empty(tmp_path: Path):
+def test_cells_of_silent_servos_and_of_joints_that_a_rig_lacks_are_empty(tmp_path):
     ticks = [made_tick(float(n)) for n in range(len(SILENT))]
     ticks = [
         replace(tick, joints=replace(tick.joints, missing=missing))
@@ -80,7 +80,7 @@ def test_cells_of_silent_servos_and_of_joints_that_a_rig_lacks_are_empty(tmp_pat
     assert {name: "".join(".x"[not row[name]] for row in rows) for name in LOST} == LOST
 
 
-def test_movements_and_blinks_of_the_plan_are_events_as_late_as_the_eyes(tmp_path: Path):
+def test_movements_and_blinks_of_the_plan_are_events_as_late_as_the_eyes(tmp_path):
     """The eyes follow 3 ticks late; a saccade of 10 degrees takes 25 ms, 2 degrees a tick."""
     plan = [min(max(2.0 * (k - 10), 0.0), 10.0) for k in range(-3, 40)]
     ticks = []
@@ -110,13 +110,13 @@ def test_movements_and_blinks_of_the_plan_are_events_as_late_as_the_eyes(tmp_pat
 
 
 @pytest.mark.parametrize("pitch_deg", [0.0, 60.0])
-def test_a_gaze_that_is_up_turns_about_the_upright_axis_by_less(tmp_path: Path, pitch_deg: float):
+def test_a_gaze_that_is_up_turns_about_the_upright_axis_by_less(tmp_path, pitch_deg):
     """At 60 deg of pitch a degree of yaw is half a degree of gaze."""
     _, (event,), _ = export([eyes(0.005 * k, 0.4 * k, pitch_deg) for k in range(60)], tmp_path)
     assert float(event["peak_deg_s"]) == pytest.approx(80.0 * cos(radians(pitch_deg)), rel=1e-3)
 
 
-def test_a_stopped_head_has_no_movement_and_one_tick_is_no_run(tmp_path: Path):
+def test_a_stopped_head_has_no_movement_and_one_tick_is_no_run(tmp_path):
     ticks = [made_tick(float(n), gaze={"blink": True}, stopped="hand") for n in range(2)]
     rows, events, _ = export(ticks, tmp_path)
     assert {row["event"] for row in rows} == {""} and not events

@@ -59,9 +59,7 @@ def test_a_blend_ends_exactly_at_its_goal_and_then_costs_nothing():
     assert blend.step(2.0) is blend.step(3.0)
 
 
-def test_an_expression_moves_joints_brows_and_head_and_the_eyes_stay_on_target(
-    made: Run,
-):
+def test_an_expression_moves_joints_brows_and_head_and_the_eyes_stay_on_target(made):
     ticks(made, 200)
     made.robot.command(Express("happy"))
     last = ticks(made, 200)[-1]
@@ -79,7 +77,7 @@ def test_a_lid_keeps_shutting_in_a_sad_face():
     assert sad[LIDS] == pytest.approx([-15.0 / 45.0, 0.0, 0.0, 0.0])
 
 
-def test_a_level_moves_the_jaw_and_falls_to_0_within_a_second(made: Run):
+def test_a_level_moves_the_jaw_and_falls_to_0_within_a_second(made):
     for _ in range(100):
         made.robot.command(SetLevel("mouth", 0.7))
         last = ticks(made, 1)[-1]
@@ -91,7 +89,7 @@ def test_a_level_moves_the_jaw_and_falls_to_0_within_a_second(made: Run):
     assert said == ["level mouth: not set any more, so it returns to 0"]
 
 
-def test_a_level_adds_to_an_expression(made: Run):
+def test_a_level_adds_to_an_expression(made):
     made.robot.command(Express("happy"))
     ticks(made, 200)
     for _ in range(40):
@@ -110,9 +108,7 @@ def test_a_level_adds_to_an_expression(made: Run):
         ({"neck_roll": 5.0}, 0.1, "must be at least 0.12 s"),
     ],
 )  # fmt: skip
-def test_an_expression_that_no_joint_can_do_is_refused(
-    face: dict[str, float], blend_s: float, said: str
-):
+def test_an_expression_that_no_joint_can_do_is_refused(face, blend_s, said):
     rig = replace(expressive_rig(), expressions={"odd": face}, expression_blend_s=blend_s)
     (fault,) = faults(rig)
     assert fault.startswith(f"expressions.odd.{next(iter(face))}: ") and said in fault
@@ -126,7 +122,7 @@ def test_an_expression_that_no_joint_can_do_is_refused(
         (LevelParams("jaw", 0.0, 20.0, 20.0), "mouth: jaw cannot move 20 deg within 0.02 s"),
     ],
 )
-def test_a_level_that_no_joint_can_follow_is_refused(level: LevelParams, said: str):
+def test_a_level_that_no_joint_can_follow_is_refused(level, said):
     found = faults(replace(expressive_rig(), levels={"mouth": level}))
     assert any(said in fault for fault in found)
 
@@ -161,11 +157,11 @@ def test_a_jaw_is_a_joint_and_a_misspelt_neck_is_not():
 
 
 @pytest.fixture
-def rig(monkeypatch: pytest.MonkeyPatch) -> Iterator[TickedRig]:
+def rig(monkeypatch) -> Iterator[TickedRig]:
     yield from connected(monkeypatch)
 
 
-def test_expressions_and_levels_from_the_command_line(rig: TickedRig):
+def test_expressions_and_levels_from_the_command_line(rig):
     assert "expression happy is active" in gazerig("ctl", "ask", "expression", "happy")
     assert rig.tick(200)["jaw"] == pytest.approx(6.0)
     assert "expression: happy (in force), neutral, sad" in gazerig("ctl", "ask", "expression")

@@ -32,7 +32,7 @@ def looks(
 
 
 @pytest.mark.parametrize(("social", "kind"), [("people", "face"), ("none", "hand")])
-def test_when_a_thing_is_lost_the_gaze_returns_to_the_face_that_was_there(social: str, kind: str):
+def test_when_a_thing_is_lost_the_gaze_returns_to_the_face_that_was_there(social, kind):
     model = attention(social=social)
     looks(model, [FACE], 0.0, 2.5)
     assert looks(model, [FACE, HAND], 2.5, 0.5)[-1].kind == "hand"
@@ -53,7 +53,7 @@ def test_a_remembered_face_is_looked_for_when_no_other_is_there():
 
 
 @pytest.mark.parametrize("cut", [False, True])
-def test_after_a_cut_nobody_is_looked_for_where_they_were(cut: bool):
+def test_after_a_cut_nobody_is_looked_for_where_they_were(cut):
     model = attention()
     looks(model, [FACE, OTHER], 0.0, 0.5)
     ids = set()
@@ -75,7 +75,7 @@ def test_memory_lasts_as_long_as_it_is_told_and_no_longer():
 
 
 @pytest.mark.parametrize("talked", [False, True])
-def test_the_gaze_goes_to_who_is_out_of_view_but_not_during_a_turn_of_talk(talked: bool):
+def test_the_gaze_goes_to_who_is_out_of_view_but_not_during_a_turn_of_talk(talked):
     model = attention()
     looks(model, [FACE, OTHER], 0.0, 0.5)
     during = [t.id for t in looks(model, [FACE], 0.5, 2.0, speaker=1 if talked else None)]

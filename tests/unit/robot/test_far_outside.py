@@ -36,7 +36,7 @@ def rig_of(name: str) -> Rig:
 
 
 @pytest.fixture
-def slipped(monkeypatch: pytest.MonkeyPatch) -> None:
+def slipped(monkeypatch) -> None:
     place(monkeypatch, {EYE: FAR})
 
 
@@ -66,7 +66,7 @@ class FarBench(Bench):
 
 @pytest.mark.parametrize("rig", ["desk", "feetech", "two buses"])
 @pytest.mark.usefixtures("slipped")
-def test_no_servo_of_the_rig_gets_torque(rig: str):
+def test_no_servo_of_the_rig_gets_torque(rig):
     bench = FarBench(rig_of(rig))
     with pytest.raises(SetupError, match=SAID) as refused:
         bench.start()
@@ -81,7 +81,7 @@ def test_no_servo_of_the_rig_gets_torque(rig: str):
 
 @pytest.mark.parametrize("rig", ["feetech", "two buses"])
 @pytest.mark.usefixtures("slipped")
-def test_on_request_it_moves_inside_slowly_and_the_run_goes_on(rig: str):
+def test_on_request_it_moves_inside_slowly_and_the_run_goes_on(rig):
     bench = FarBench(rig_of(rig), recover=True)
     bench.start()
     angles = bench.run(7.0)
@@ -94,7 +94,7 @@ def test_on_request_it_moves_inside_slowly_and_the_run_goes_on(rig: str):
     assert abs(angles[-1]) < 1.0
 
 
-def test_a_joint_a_little_outside_moves_inside_without_request(monkeypatch: pytest.MonkeyPatch):
+def test_a_joint_a_little_outside_moves_inside_without_request(monkeypatch):
     place(monkeypatch, {EYE: 44.0})
     bench = FarBench(load_rig("feetech"))
     bench.start()
@@ -102,9 +102,7 @@ def test_a_joint_a_little_outside_moves_inside_without_request(monkeypatch: pyte
 
 
 @pytest.mark.parametrize("rig", ["desk", "feetech"])
-def test_a_servo_that_restarts_far_outside_stays_limp_until_it_is_turned_back(
-    rig: str, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_servo_that_restarts_far_outside_stays_limp_until_it_is_turned_back(rig, monkeypatch):
     place(monkeypatch, {})
     bench = FarBench(load_rig(rig))
     bench.start()
@@ -123,9 +121,7 @@ def test_a_servo_that_restarts_far_outside_stays_limp_until_it_is_turned_back(
     assert bench.body.bus.faults() == () and all(bench.joints.torque)
 
 
-def test_a_stop_holds_when_a_hand_has_turned_a_joint_far_outside(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_a_stop_holds_when_a_hand_has_turned_a_joint_far_outside(monkeypatch):
     place(monkeypatch, {})
     bench = FarBench(load_rig("desk"))
     bench.start()
@@ -154,7 +150,7 @@ def test_a_servo_without_a_position_is_not_taken_for_one_inside():
 
 @pytest.mark.parametrize("bus", ["ideal", "emulated"])
 @pytest.mark.usefixtures("slipped")
-def test_the_command_is_refused_in_one_line_and_recovers_on_request(bus: str, capfd: Terminal):
+def test_the_command_is_refused_in_one_line_and_recovers_on_request(bus, capfd):
     words = (
         "run",
         "desk",
@@ -178,7 +174,7 @@ def test_the_command_is_refused_in_one_line_and_recovers_on_request(bus: str, ca
 
 
 @pytest.mark.usefixtures("slipped")
-def test_the_doctor_says_the_same(capfd: Terminal):
+def test_the_doctor_says_the_same(capfd):
     pytest.importorskip("gazerig.features.bringup")
     assert typed("doctor", "desk", "--mock") == 1
     said = capfd.readouterr().out

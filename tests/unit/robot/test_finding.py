@@ -1,7 +1,5 @@
 """An order to find a person: where the head looks, whom it finds, and when it gives up."""
 
-from pathlib import Path
-
 import cv2
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from gazerig.gaze.attention.finding import Sought
 pytestmark = pytest.mark.usefixtures("ideal_servos")
 
 
-def test_a_person_is_found_where_it_is_wanted_or_nobody_in_time(tmp_path: Path):
+def test_a_person_is_found_where_it_is_wanted_or_nobody_in_time(tmp_path):
     rig = at_rate(tmp_path, "desk", 50.0)
     with gazerig.open(rig, fast=True, scene="face-to-face", bus="ideal") as head:
         head.step(1.0)

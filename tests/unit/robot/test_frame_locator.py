@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from math import radians
-from typing import Any
 
 import numpy as np
 import pytest
@@ -87,9 +86,7 @@ COMPACT = """
 
 
 @pytest.mark.parametrize(("height_px", "area_px", "compact"), rows(COMPACT.replace(",", "\n")))
-def test_a_patch_as_wide_as_high_that_fills_its_box_is_compact(
-    height_px: float, area_px: float, compact: float
-):
+def test_a_patch_as_wide_as_high_that_fills_its_box_is_compact(height_px, area_px, compact):
     patch = replace(BALL, box_px=(9.0, 9.0, 50.0, height_px), area_px=area_px)
     (thing,) = LOCATOR(picture(1, blobs=(patch,))).things
     assert thing.compact == bool(compact)
@@ -110,7 +107,7 @@ hand 420  300  50  2    2    |  0.4      0.4      2        0.0207846 0
 
 
 @pytest.mark.parametrize("row", rows(PARTS))
-def test_a_part_of_a_body_is_where_its_length_or_depth_puts_it(row: list[Any]):
+def test_a_part_of_a_body_is_where_its_length_or_depth_puts_it(row):
     kind, x, y, size, depth, to, *place, along, edge = row
     depth_m = None if depth == "none" else np.full((400, 640), depth, np.float32)
     if depth_m is not None and to != depth:  # too few of its pixels have one
@@ -140,7 +137,7 @@ THINGS = """
 
 
 @pytest.mark.parametrize("line", THINGS.splitlines()[3:])
-def test_a_thing_has_the_errors_of_its_place_and_speed(line: str):
+def test_a_thing_has_the_errors_of_its_place_and_speed(line):
     given, _, wanted = line.partition("|")
     known, depth_sd, loom_sd, radius_m, *size = given.split()
     *errors, upper = wanted.split()
@@ -175,7 +172,7 @@ CHESTS = """
 
 
 @pytest.mark.parametrize("row", rows(CHESTS))
-def test_a_face_printed_on_a_shirt_or_badge_is_no_second_face(row: list[float]):
+def test_a_face_printed_on_a_shirt_or_badge_is_no_second_face(row):
     sure, other_sure, aside, below, wide, faces = row
     one = replace(FACE, confidence=sure, box_px=(300.0, 60.0, 64.0, 50.0))
     box = (332.0 + 50.0 * aside - 32.0 * wide, 85.0 + 50.0 * below - 40.0, 64.0 * wide, 80.0)

@@ -64,7 +64,7 @@ def found(scene: Turning, seconds: float) -> list[Face]:
     [(1.2, 0, True), (0.7, 5, True), (2.5, 5, True), (0.7, 20, False), (1.2, -15, False),
      (2.5, -15, False), (1.2, -30, False)],
 )  # fmt: skip
-def test_e77_a_person_who_looks_at_the_head_is_known(away_m: float, off_deg: float, looks: bool):
+def test_e77_a_person_who_looks_at_the_head_is_known(away_m, off_deg, looks):
     each = found(Turning(away_m, off_deg, 0.1), 8.0)
     assert len(each) > 200
     assert np.mean([face.looks_at_head is looks for face in each]) >= 0.95
@@ -73,7 +73,7 @@ def test_e77_a_person_who_looks_at_the_head_is_known(away_m: float, off_deg: flo
 
 
 @pytest.mark.parametrize("off_deg", [8.0, 12.0])
-def test_e77_on_the_edge_the_answer_does_not_flicker(off_deg: float):
+def test_e77_on_the_edge_the_answer_does_not_flicker(off_deg):
     each = [face.looks_at_head for face in found(Turning(1.2, off_deg), 30.0)]
     changes = sum(a != b for a, b in zip(each, each[1:], strict=False))
     assert changes <= 30
@@ -93,9 +93,7 @@ def test_what_was_found_before_stays_between_the_edges():
 
 
 @pytest.mark.parametrize("away_m", [0.7, 1.5, 3.0])
-def test_the_deviation_of_a_turn_is_that_of_landmarks_with_their_usual_errors(
-    away_m: float,
-):
+def test_the_deviation_of_a_turn_is_that_of_landmarks_with_their_usual_errors(away_m):
     rng, R, p = np.random.default_rng(2), turned(0.0, 0.0, 0.0), np.array((0.0, 0.0, away_m))
     exact = image_of(R, p)
     eyes_px = float(np.linalg.norm(exact[0] - exact[1]))
@@ -119,7 +117,7 @@ def detection(gaze: Vec3 | None) -> Detections:
 @pytest.mark.parametrize(
     ("gaze", "looks"), [(None, False), ((0.0, 0.0, -1.0), True), ((0.3, 0.0, -0.95), False)]
 )
-def test_the_eyes_go_before_the_face(gaze: Vec3 | None, looks: bool):
+def test_the_eyes_go_before_the_face(gaze, looks):
     percept = Perception(AT_EYES, 65.0).see(detection(gaze), standing())
     assert percept is not None
     (face,) = percept.faces
@@ -146,9 +144,7 @@ def percept_of(t_s: float, *rows: Face) -> Percept:
 @pytest.mark.parametrize(
     ("social", "looked_at"), [("people", [(2,), (1,)]), ("none", [(1, 2), (1, 2)])]
 )
-def test_of_two_faces_the_one_that_looks_at_the_head_gets_more(
-    social: str, looked_at: list[tuple[int, ...]]
-):
+def test_of_two_faces_the_one_that_looks_at_the_head_gets_more(social, looked_at):
     left, right = (1.0, 0.2, 0.0), (1.0, -0.2, 0.0)
     for (one, other), first in zip([(False, True), (True, False)], looked_at, strict=True):
         model = attention(social=social)

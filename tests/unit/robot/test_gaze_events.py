@@ -40,7 +40,7 @@ Eyes = tuple[str, int, bool, int]
          [("the target is the chosen point", "target", ORDERED)]),
     ],
 )  # fmt: skip
-def test_what_changes_between_two_ticks_is_an_event(before: Eyes, after: Eyes, found: list[object]):
+def test_what_changes_between_two_ticks_is_an_event(before, after, found):
     feed = TickFeed()
     ticks = [
         made_tick(0.1 * n, gaze={"phase": phase, "saccades": count, "blink": blink},
@@ -75,9 +75,7 @@ CUES = (("a", 0.0), ("b", 1.0), ("c", 2.0))
         (None, 0.5, "finished", []),
     ],
 )
-def test_cues_and_ends_of_tracks_are_events(
-    before_s: float | None, now_s: float, end: str, found: list[str]
-):
+def test_cues_and_ends_of_tracks_are_events(before_s, now_s, end, found):
     feed, track = TickFeed(), TrackState("nod", cues=CUES, number=7)
     other = TrackState("shake", number=6)
     before = () if before_s is None else (replace(track, position_s=before_s),)

@@ -159,7 +159,7 @@ ARMS = """
 
 
 @pytest.mark.parametrize("row", rows(ARMS))
-def test_an_arm_that_moves_within_reach_is_a_hand_from_the_second_frame_on(row: list[float]):
+def test_an_arm_that_moves_within_reach_is_a_hand_from_the_second_frame_on(row):
     aside, up, end, height, tip_m_s, middle_m_s, face_m_s, radius_m, is_hand = row
     # Its speed counts across the view: to the side, seen from aside, by less.
     tip, middle = (1.0, aside, up), (1.0, 0.5 * (aside + end), 0.5 * (up + height))
@@ -189,9 +189,7 @@ def test_a_hand_remains_one_where_it_turns_or_passes_before_the_face_and_not_for
 
 
 @pytest.mark.parametrize(("last_m_s", "stays"), [(0.1, True), (1.2, False)])
-def test_a_hand_that_has_come_to_rest_is_still_there_and_one_that_went_is_not(
-    last_m_s: float, stays: bool
-):
+def test_a_hand_that_has_come_to_rest_is_still_there_and_one_that_went_is_not(last_m_s, stays):
     hands, there = Hands(), []
     for k in range(90):
         speed = 1.2 if k < 10 else last_m_s
@@ -232,7 +230,7 @@ def test_e91_a_waving_hand_is_found_from_pixels_and_whose_it_is():
 
 
 @pytest.mark.parametrize(("scene", "start_s"), [("walks-past", 5.2), ("sits-still", 0.0)])
-def test_e92_who_walks_by_or_sits_still_has_no_hands(scene: str, start_s: float):
+def test_e92_who_walks_by_or_sits_still_has_no_hands(scene, start_s):
     for frame in frames(load_scene(scene), start_s, start_s + 2.0):
         assert frame.seen(HAND) == {}
 
@@ -250,7 +248,7 @@ def coming(growth_1_s: float, sd_1_s: float = 0.3, radius_m: float = 0.2) -> Loc
     [(coming(5.0), HAND), (coming(2.0), "thing"), (coming(5.0, sd_1_s=2.0), "thing"),
      (coming(5.0, radius_m=0.05), "thing")],
 )  # fmt: skip
-def test_what_comes_at_the_camera_is_a_hand_at_once(seen: Located, first: str):
+def test_what_comes_at_the_camera_is_a_hand_at_once(seen, first):
     assert kinds(Hands(), seen)[0] == first
 
 
@@ -327,7 +325,7 @@ BODIES = """
 
 
 @pytest.mark.parametrize("row", rows(BODIES))
-def test_what_moves_on_the_body_of_a_person_is_theirs(row: list[Any]):
+def test_what_moves_on_the_body_of_a_person_is_theirs(row):
     aside, up, deeper, measured, v, v_face, own, on_head = row
     turn, lift, far = 2.0 * np.arcsin(aside / 40.0), np.arcsin(up / 20.0), 20.0 + deeper
     way = np.cos(lift) * np.cos(turn), np.cos(lift) * np.sin(turn), np.sin(lift)

@@ -61,7 +61,7 @@ PLACES = """
 
 
 @pytest.mark.parametrize("row", rows(PLACES))
-def test_a_head_turns_about_its_pivot(row: list[float]):
+def test_a_head_turns_about_its_pivot(row):
     head, place = turns(row[:3]), row[3:]
     R, p = HEAD.head_pose(head)
     assert p == pytest.approx(place) and HEAD.pivot_m(R, p) == pytest.approx((0.0, 0.0, 0.06))
@@ -106,7 +106,7 @@ SIGHTS = """
 
 
 @pytest.mark.parametrize("row", rows(SIGHTS))
-def test_each_eye_has_its_own_angles_to_a_point(row: list[float]):
+def test_each_eye_has_its_own_angles_to_a_point(row):
     R, p = HEAD.head_pose(turns(row[:3]))
     point, (a, b, c, d) = (row[3], row[4], row[5]), map(atan, row[6:])
     assert HEAD.eye_angles_to(point, R, p) == (pytest.approx((a, b)), pytest.approx((c, d)))
@@ -147,7 +147,7 @@ QUATERNIONS = """
 
 
 @pytest.mark.parametrize("q", rows(QUATERNIONS.replace(",", "\n")))
-def test_a_rotation_is_its_quaternion(q: list[float]):
+def test_a_rotation_is_its_quaternion(q):
     w, x, y, z = q
     R = (
         (1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)),
@@ -170,7 +170,7 @@ TURNS = """
 
 
 @pytest.mark.parametrize("row", rows(TURNS))
-def test_a_camera_is_turned_left_up_and_right_side_down(row: list[float]):
+def test_a_camera_is_turned_left_up_and_right_side_down(row):
     yaw, pitch, roll = row[:3]
     ahead, right = row[3:6], row[6:]
     R_left, p = HEAD.head_pose(LEFT)
@@ -230,7 +230,7 @@ LENSES = """
 
 
 @pytest.mark.parametrize("row", [line.split(maxsplit=6) for line in LENSES.splitlines()[2:]])
-def test_a_lens_that_does_not_fit_says_why(row: list[str]):
+def test_a_lens_that_does_not_fit_says_why(row):
     wide, high, width, height = (int(row[i]) for i in (0, 1, 4, 5))
     lens = LensParams((wide, high), (480.0, 490.0), (float(row[2]), float(row[3])))
     assert (lens_fault(lens, width, height) or "-") == row[6]

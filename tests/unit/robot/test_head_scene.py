@@ -64,7 +64,7 @@ def skin_and_cap() -> Floats:
 
 @pytest.mark.parametrize("name", RIGS)
 @pytest.mark.parametrize("aspect", CANVASES)
-def test_the_head_fills_most_of_the_canvas_and_is_all_in_sight(name: str, aspect: float):
+def test_the_head_fills_most_of_the_canvas_and_is_all_in_sight(name, aspect):
     shot = at_rest(name)
     unit = head_dimensions(shot).interocular_m
     points = skin_and_cap() * unit + shot.tick.pose.p_world_head_m
@@ -93,7 +93,7 @@ WHOLE: dict[str, Callable[[], Painted]] = {
 
 
 @pytest.mark.parametrize("part", WHOLE)
-def test_faces_are_turned_outwards_for_their_backs_are_not_drawn(part: str):
+def test_faces_are_turned_outwards_for_their_backs_are_not_drawn(part):
     vertices, faces = WHOLE[part]().mesh
     a, b, c = (vertices[faces[:, i]] - vertices.mean(axis=0) for i in range(3))
     assert (a * np.cross(b, c)).sum() > 0.0  # six times the volume within
@@ -109,7 +109,7 @@ def server() -> Iterator[viser.ViserServer]:
     made.stop()
 
 
-def test_the_head_is_where_its_joints_put_it(server: viser.ViserServer):
+def test_the_head_is_where_its_joints_put_it(server):
     """Every link is in its parent by the kinematics, at any angles of a shipped rig."""
     rig = load_rig("desk")
     view, count = HeadView(server.scene), len(rig_kinematics(rig).names)

@@ -70,7 +70,7 @@ def test_a_servo_fault_ends_the_loop_with_its_cause():
     assert count.ticks <= 105
 
 
-def test_parking_reaches_the_pose_and_torque_goes_off(monkeypatch: pytest.MonkeyPatch):
+def test_parking_reaches_the_pose_and_torque_goes_off(monkeypatch):
     assembly = simulated(rate=100.0)
     ticks(assembly, 4.0)
     seen: list[Tick] = []
@@ -175,7 +175,7 @@ def test_a_picture_is_placed_where_the_head_was_when_it_was_taken():
 
 @pytest.mark.parametrize("turn_deg", [-30.0, 0.0, 30.0])
 @pytest.mark.parametrize("aside_m", [-0.25, 0.25])
-def test_e56_own_parts_move_and_turn_with_the_face(turn_deg: float, aside_m: float):
+def test_e56_own_parts_move_and_turn_with_the_face(turn_deg, aside_m):
     own = {code: (-0.03, 0.02 * i - 0.07, 0.05 - 0.015 * i) for i, code in enumerate(PARTS)}
     perception = Perception(MOUNT, 69.0, own)
     nose, R = (1.0, aside_m, 0.25), rotation((radians(180.0 + turn_deg), 0.0, 0.0))
@@ -231,7 +231,7 @@ class LateClock:
 
 @pytest.mark.parametrize("host", HOSTS)
 @pytest.mark.parametrize("name", ["desk", "maker"])
-def test_it_parks_in_time_on_a_host_that_is_late(name: str, host: str):
+def test_it_parks_in_time_on_a_host_that_is_late(name, host):
     rig = load_rig(name)
     made = simulated(rig)
     robot, period_s = made.robot, 1.0 / made.loop.rate_hz

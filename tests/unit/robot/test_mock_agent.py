@@ -1,7 +1,5 @@
 """The simulated voice agent of a scene, and the conversation that the page plays."""
 
-from pathlib import Path
-
 import pytest
 from slow_rigs import at_rate
 
@@ -41,7 +39,7 @@ agent:
 """
 
 
-def test_an_agent_reports_the_turns_of_its_script_round_after_round(tmp_path: Path):
+def test_an_agent_reports_the_turns_of_its_script_round_after_round(tmp_path):
     (path := tmp_path / "quick.yaml").write_text(SCENE)
     acts = load_scene(str(path)).agent
     with gazerig.open(
@@ -69,7 +67,7 @@ def test_an_agent_reports_the_turns_of_its_script_round_after_round(tmp_path: Pa
         ("  - {at_s: 57.0, state: speaking, seconds: -1}", "seconds"),
     ],
 )
-def test_a_faulty_script_is_refused_with_its_line(tmp_path: Path, line: str, fault: str):
+def test_a_faulty_script_is_refused_with_its_line(tmp_path, line, fault):
     text = shipped_path("scenes", "interview").read_text()
     (path := tmp_path / "mine.yaml").write_text(text + line + "\n")
     with pytest.raises(ConfigError, match=fault) as refused:

@@ -140,7 +140,7 @@ def act(motion: MotionLimiter, side: int, action: str) -> None:
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("row", rows(STEPS))
-def test_steps_keep_speed_acceleration_and_range(row: list[Any], side: int):
+def test_steps_keep_speed_acceleration_and_range(row, side):
     motion = MotionLimiter((LIMIT,))
     for action in row[:-3]:
         act(motion, side, action)
@@ -149,7 +149,7 @@ def test_steps_keep_speed_acceleration_and_range(row: list[Any], side: int):
 
 
 @pytest.mark.parametrize("side", [1, -1])
-def test_walls_count_from_where_a_joint_can_stop(side: int):
+def test_walls_count_from_where_a_joint_can_stop(side):
     motion = moving(0.25, 1.0, side)
     ahead, behind = (motion.keeps_below, motion.keeps_above)[::side]
     walls = "0.3125 1 0\n 0.3124999995 1 0\n 0.312499998 0 0\n 0.25 0 1\n 0.2500000005 0 1"
@@ -178,9 +178,7 @@ KEEPS = """
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize(("p", "v", "keeps"), rows(KEEPS.replace(",", "\n")))
-def test_a_motion_keeps_another_limit_if_it_can_stop_inside(
-    side: int, p: float, v: float, keeps: float
-):
+def test_a_motion_keeps_another_limit_if_it_can_stop_inside(side, p, v, keeps):
     assert moving(p, v, side).keeps_limit(0, JointLimit(-0.5, 0.5, 1.0, 8.0)) == keeps
 
 
@@ -239,7 +237,7 @@ LATE = """
 
 
 @pytest.mark.parametrize("row", rows(LATE))
-def test_a_late_tick_is_one_gap(row: list[float]):
+def test_a_late_tick_is_one_gap(row):
     *ticks, moves_s, gap_s = row
     late = LateTicks(1 / 64)
     assert late.soft_until_s == -inf
@@ -299,7 +297,7 @@ t60_v3.5           0    voltage     -
 
 
 @pytest.mark.parametrize(("readings", "share", "why", "held"), rows(STRAIN))
-def test_strain_slows_a_joint_down_and_stops_it(readings: str, share: float, why: str, held: str):
+def test_strain_slows_a_joint_down_and_stops_it(readings, share, why, held):
     """Each word: temperature, voltage or load of the second joint, and for how many ticks."""
     limit = JointLimit(-1.0, 1.0, 2.0, 8.0, 70.0, 3.5, 7.0)
     health = JointHealth((limit, limit))
@@ -336,7 +334,7 @@ is_just_far     0 6.99, 0.2 6.99                            1
 
 
 @pytest.mark.parametrize("case", rows(STALLS))
-def test_a_joint_has_stalled_if_it_stays_far_from_its_command(case: list[float]):
+def test_a_joint_has_stalled_if_it_stays_far_from_its_command(case):
     """The command is 10 deg."""
     steps, found = zip(case[1:-1:2], case[2:-1:2], strict=True), case[-1]
     stuck = StallDetector(2)
@@ -392,7 +390,7 @@ BOX = """
 
 @pytest.mark.parametrize("first", [0, 1])
 @pytest.mark.parametrize("row", rows(BOX))
-def test_one_joint_of_a_pair_has_a_wall(row: list[float], first: int):
+def test_one_joint_of_a_pair_has_a_wall(row, first):
     """Both must not be within 10..30 deg at once, with 1 deg of margin."""
     columns = list(zip(row[::2], row[1::2], strict=True))
     if first:  # the other joint, after the two have changed roles
@@ -419,7 +417,7 @@ def test_one_joint_of_a_pair_has_a_wall(row: list[float], first: int):
 
 @pytest.mark.parametrize("side", [1, -1])
 @pytest.mark.parametrize("farthest_first", [True, False])
-def test_a_joint_leaves_all_its_boxes_on_one_side(side: int, farthest_first: bool):
+def test_a_joint_leaves_all_its_boxes_on_one_side(side, farthest_first):
     """From -30 deg the only way out is up, past 0 deg; the end of the range is too near below."""
 
     def span(name: str, low: float, high: float) -> tuple[str, float, float]:

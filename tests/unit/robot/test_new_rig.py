@@ -20,19 +20,19 @@ TEMPLATES = {
 
 
 @pytest.fixture(autouse=True)
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def here(tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
 @pytest.mark.parametrize("name", TEMPLATES)
-def test_a_shipped_template_is_what_new_writes(name: str):
+def test_a_shipped_template_is_what_new_writes(name):
     assert typed("new", f"{name}.yaml", *TEMPLATES[name]) == 0
     shipped = SHIPPED / "rigs" / f"{name}.yaml"
     assert Path(f"{name}.yaml").read_text("utf-8") == shipped.read_text("utf-8")
 
 
 @pytest.mark.parametrize("board", BOARDS)
-def test_every_board_with_every_mechanism_and_camera_is_good(board: str):
+def test_every_board_with_every_mechanism_and_camera_is_good(board):
     for mechanism, camera in itertools.product(MECHANISMS, CAMERAS):
         new = NewRig("mine", board, joints_of(mechanism), camera)
         file = Path("mine.yaml")
@@ -85,7 +85,7 @@ def test_the_next_steps_are_those_of_board_and_camera():
         (("there.yaml",), "there.yaml already exists"),
     ],
 )
-def test_what_cannot_be_is_one_clear_line_and_writes_nothing(words: tuple[str, ...], told: str):
+def test_what_cannot_be_is_one_clear_line_and_writes_nothing(words, told):
     Path("there.yaml").write_text("mine", "utf-8")
     done = invoked("new", *words)
     assert done.code == 2 and told in done.err, done.err

@@ -1,7 +1,5 @@
 """Panels of packages return HTML; a failed one shows why, and the page continues."""
 
-from pathlib import Path
-
 from outside_package import install, on_path
 from page_feed import shown
 
@@ -15,7 +13,7 @@ def broken(state): raise RuntimeError("no <bulb>")
 NAMES = {"phase": "counter:phase", "broken": "counter:broken", "none": "counter:nothing"}
 
 
-def test_panels_of_packages_are_drawn_and_failures_named(tmp_path: Path):
+def test_panels_of_packages_are_drawn_and_failures_named(tmp_path):
     install(tmp_path, "counter", {"gazerig.page_panel": NAMES}, {"counter": CODE})
     state = head_state(shown().tick)
     with on_path(tmp_path):

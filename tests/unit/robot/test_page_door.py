@@ -45,7 +45,7 @@ def near() -> Iterator[Rig]:
 # --- on this machine ----------------------------------------------------------------------
 
 
-def test_the_page_comes_with_its_stop_button(near: Rig):
+def test_the_page_comes_with_its_stop_button(near):
     status, headers, text = near.get()
     assert status == 200 and 'src="/rig/stop.js"></script>' in text
     assert headers["X-Frame-Options"] == "DENY"
@@ -54,7 +54,7 @@ def test_the_page_comes_with_its_stop_button(near: Rig):
     assert status == 200 and "javascript" in headers["Content-Type"] and "STOP" in text
 
 
-def test_the_view_is_viser_in_a_frame_of_this_page_alone(near: Rig):
+def test_the_view_is_viser_in_a_frame_of_this_page_alone(near):
     status, headers, text = near.get("/view/")
     assert (
         status == 200
@@ -69,14 +69,14 @@ def test_the_view_is_viser_in_a_frame_of_this_page_alone(near: Rig):
 
 
 @pytest.mark.parametrize("host", ["elsewhere.example", "127.0.0.1.elsewhere.example", "10.0.0.1"])
-def test_a_foreign_name_for_this_machine_is_refused(near: Rig, host: str):
+def test_a_foreign_name_for_this_machine_is_refused(near, host):
     status, _, text = near.get(Host=host)
     assert status == 403 and text.startswith("refused") and len(text.splitlines()) == 1
     assert near.get("/rig/stop.js", Host=host)[0] == 403
 
 
 @pytest.mark.parametrize("origin", [ELSEWHERE, "null", "http://127.0.0.1:1", None])
-def test_a_page_of_another_origin_gets_no_websocket(near: Rig, origin: str | None):
+def test_a_page_of_another_origin_gets_no_websocket(near, origin):
     for path in ("/view", SOCKET, "/api/v1/webcam"):
         with pytest.raises(InvalidStatus) as refused:
             near.knock(path, origin=origin)
@@ -84,13 +84,13 @@ def test_a_page_of_another_origin_gets_no_websocket(near: Rig, origin: str | Non
 
 
 @pytest.mark.parametrize("origin", [ELSEWHERE, "null", None])
-def test_a_page_of_another_origin_cannot_ask_for_anything(near: Rig, origin: str | None):
+def test_a_page_of_another_origin_cannot_ask_for_anything(near, origin):
     before = len(near.asked)
     status, _, _ = near.post(b'{"do": "stop", "why": "x"}', Origin=origin)
     assert status == 403 and len(near.asked) == before and near.stops == []
 
 
-def test_what_is_asked_goes_to_the_rig_with_the_name_of_who_asks(near: Rig):
+def test_what_is_asked_goes_to_the_rig_with_the_name_of_who_asks(near):
     named = []
     for who in ("ana", "bob", "ana"):
         body = b'{"do": "resume", "confirmed": true}'
@@ -105,7 +105,7 @@ def test_what_is_asked_goes_to_the_rig_with_the_name_of_who_asks(near: Rig):
         assert json.loads(end.recv(timeout=PATIENCE_S))["ok"]["you"] == named[1]
 
 
-def test_control_is_renewed_while_the_browser_in_control_is_there(near: Rig):
+def test_control_is_renewed_while_the_browser_in_control_is_there(near):
     near.answer = lambda asked: {"ok": {"reply": {"control_number": 1}}}
 
     def renewed() -> int:
@@ -127,7 +127,7 @@ def test_control_is_renewed_while_the_browser_in_control_is_there(near: Rig):
         near.answer = lambda asked: DONE
 
 
-def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig):
+def test_the_address_that_a_program_is_handed_opens_the_page_once(near):
     near.door.admission.one_time_token = "once-and-no-more"
     assert fetch(f"{near.url}/?token=wrong")[0] == 403
     status, headers, _ = fetch(f"{near.url}/?token=once-and-no-more")
@@ -138,7 +138,7 @@ def test_the_address_that_a_program_is_handed_opens_the_page_once(near: Rig):
     )
 
 
-def test_a_resume_of_a_browser_needs_a_person_who_confirms(near: Rig):
+def test_a_resume_of_a_browser_needs_a_person_who_confirms(near):
     near.asked.clear()
     with near.knock(SOCKET, Cookie=near.named("ana")) as end:
         for words in ({}, {"confirmed": 1}):
@@ -154,13 +154,13 @@ def test_a_resume_of_a_browser_needs_a_person_who_confirms(near: Rig):
 @pytest.mark.parametrize(
     "body", [b"", b"nonsense", b"[1, 2]", b'"stop"', b"\xff", b"[" * 2000, b'{"a": NaN}']
 )
-def test_rubbish_is_not_handed_on(near: Rig, body: bytes):
+def test_rubbish_is_not_handed_on(near, body):
     before = len(near.asked)
     assert near.post(body)[0] == 400
     assert len(near.asked) == before
 
 
-def test_too_much_is_not_even_read(near: Rig):
+def test_too_much_is_not_even_read(near):
     before = len(near.asked)
     with pytest.raises((urllib.error.URLError, ConnectionError)) as refused:
         answer = near.post(json.dumps({"do": "x" * 10_000_000}).encode())
@@ -172,7 +172,7 @@ def test_too_much_is_not_even_read(near: Rig):
 # --- stop -----------------------------------------------------------------------------------
 
 
-def test_a_stop_overtakes_all_that_waits_and_is_answered_by_the_rig(near: Rig):
+def test_a_stop_overtakes_all_that_waits_and_is_answered_by_the_rig(near):
     near.stops.clear()
     over = threading.Event()
 
@@ -208,7 +208,7 @@ def test_a_stop_overtakes_all_that_waits_and_is_answered_by_the_rig(near: Rig):
 # --- limits -----------------------------------------------------------------------------------
 
 
-def test_whoever_opens_too_much_loses_his_own(near: Rig):
+def test_whoever_opens_too_much_loses_his_own(near):
     """35 websockets of one visitor, 200 silent connections: another's websocket and STOP stay."""
     with near.knock(SOCKET, Cookie=near.named("ana")) as ana:
         greedy = [near.knock(SOCKET, Cookie=near.named("bob")) for _ in range(MOST_CLIENTS + 3)]
@@ -256,9 +256,7 @@ def dragged(near: Rig) -> Iterator[viser.TransformControlsHandle]:
     handle.remove()
 
 
-def test_the_server_behind_the_door_is_reached_by_the_door_alone(
-    near: Rig, dragged: viser.TransformControlsHandle
-):
+def test_the_server_behind_the_door_is_reached_by_the_door_alone(near, dragged):
     inside = near.door._inside
     assert stat.S_ISSOCK(inside.stat().st_mode)
     assert inside.parent.stat().st_mode & 0o077 == 0  # other users cannot even go there
@@ -285,7 +283,7 @@ def listening(process: int) -> list[str]:
     return [x for x in lines if x.split()[3] == "0A" and f"socket:[{x.split()[9]}]" in held]
 
 
-def test_a_message_that_is_too_long_ends_its_connection_alone(near: Rig):
+def test_a_message_that_is_too_long_ends_its_connection_alone(near):
     with near.knock() as long, near.knock() as other:
         with pytest.raises(ConnectionClosed):
             long.send(bytes(FROM_BROWSER_BYTES + 1))
@@ -298,7 +296,7 @@ def test_a_message_that_is_too_long_ends_its_connection_alone(near: Rig):
             end.recv(timeout=PATIENCE_S)
 
 
-def test_a_browser_cannot_publish_the_page(near: Rig):
+def test_a_browser_cannot_publish_the_page(near):
     handlers = near.server._websock_server._incoming_handlers
     assert not [kind.__name__ for kind in handlers if "ShareUrl" in kind.__name__]
 
@@ -325,14 +323,14 @@ def either(request: pytest.FixtureRequest, near: Rig, far: Rig) -> Rig:
 @pytest.mark.parametrize(
     "path", ["/", "/view/", "/rig/stop.js", "/?token=wrong", "/?token=", "/?token=%ff"]
 )
-def test_without_the_token_nothing_is_seen(either: Rig, path: str):
+def test_without_the_token_nothing_is_seen(either, path):
     status, headers, text = fetch(either.url + path)
     assert status == 403 and text.startswith("refused") and len(text.splitlines()) == 1
     assert "Set-Cookie" not in headers
 
 
 @pytest.mark.parametrize("cookie", [None, "wrong", "", "\xff"])
-def test_without_the_token_nothing_moves(either: Rig, cookie: str | None):
+def test_without_the_token_nothing_moves(either, cookie):
     either.asked.clear()
     either.stops.clear()
     given = None if cookie is None else f"{either.door._cookie}={cookie}"
@@ -345,7 +343,7 @@ def test_without_the_token_nothing_moves(either: Rig, cookie: str | None):
     assert either.asked == either.stops == []
 
 
-def test_the_token_becomes_a_cookie_and_leaves_the_address(either: Rig):
+def test_the_token_becomes_a_cookie_and_leaves_the_address(either):
     status, headers, text = fetch(f"{either.url}/?look=here&token={TOKEN}")
     assert (status, headers["Location"], text) == (302, "/?look=here", "")
     cookie = headers["Set-Cookie"]
@@ -368,7 +366,7 @@ def raw_answer(rig: Rig, path: str, headers: str = "") -> bytes:
 @pytest.mark.parametrize(
     "path", ["//evil/", "/%5Cevil/", "/\\evil/", "///evil", "//evil/%2e%2e//x"]
 )
-def test_the_token_leads_to_this_page_and_nowhere_else(near: Rig, path: str):
+def test_the_token_leads_to_this_page_and_nowhere_else(near, path):
     answer = raw_answer(near, f"{path}?token={TOKEN}").decode()
     place = next(line for line in answer.splitlines() if line.startswith("Location: "))
     assert place.startswith("Location: /") and place[11:12] not in ("/", "\\")
@@ -379,7 +377,7 @@ def test_the_token_leads_to_this_page_and_nowhere_else(near: Rig, path: str):
     ["/../../../../etc/passwd", "/%2e%2e/%2e%2e/%2e%2e/etc/passwd", "/..%2f..%2f..%2fetc%2fpasswd",
      "//etc/passwd", "/assets/../../../../../../etc/passwd", "/\\..\\etc\\passwd"],
 )  # fmt: skip
-def test_no_path_leads_out_of_the_pages_own_files(near: Rig, path: str):
+def test_no_path_leads_out_of_the_pages_own_files(near, path):
     answer = raw_answer(near, path, f"Cookie: {near.cookie}\r\n")
     assert b"root:" not in answer and b" 500 " not in answer.splitlines()[0]
 
@@ -403,7 +401,7 @@ def test_a_stop_that_the_rig_does_not_answer_is_said_and_the_next_one_is_sent():
         assert len(rig.stops) == 2
 
 
-def test_neither_websockets_nor_slow_requests_shut_out_a_stop(near: Rig):
+def test_neither_websockets_nor_slow_requests_shut_out_a_stop(near):
     """Websockets have limits of their own, and a request that has just begun is not closed."""
     head = f"POST /api/v1/do HTTP/1.1\r\nHost: {near.address}\r\nOrigin: {near.url}\r\n"
     head += f"Cookie: {near.cookie}\r\nContent-Length: 14\r\n\r\n"
@@ -431,7 +429,7 @@ def test_neither_websockets_nor_slow_requests_shut_out_a_stop(near: Rig):
         assert len(near.stops) == 2
 
 
-def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near: Rig):
+def test_a_flood_of_one_browser_does_not_hold_up_a_stop(near):
 
     def answer_slowly(asked: object) -> Any:
         time.sleep(0.05)  # as a rig that is busy

@@ -71,14 +71,14 @@ def page_here(*others: int) -> int | None:
     return found[0] if found else None
 
 
-def test_busy_port_moves_on_and_says_so(shared: Page):
+def test_busy_port_moves_on_and_says_so(shared):
     port = urlsplit(shared.url).port
     assert port is not None and port > shared.busy_port
     assert shared.notice == f"port {shared.busy_port} is busy, using {port}"
     assert b"<html" in Visitor(shared.url).get().lower()
 
 
-def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(shared: Page):
+def test_page_is_on_the_loopback_alone_and_ignores_ctrl_c(shared):
     port = urlsplit(shared.url).port
     # The whole of 127.0.0.0/8 is this machine: a page on every address would answer here.
     with pytest.raises(ConnectionRefusedError):
@@ -148,7 +148,7 @@ def drained(there: ClientConnection) -> int:
     return taken
 
 
-def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(shared: Page):
+def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(shared):
     changes: dict[str, object] = {}
     # Noise does not compress: what the deaf browsers are owed soon fills all buffers.
     noise = np.random.default_rng(0).integers(0, 255, (8, 400, 640, 3)).astype(np.uint8)
@@ -186,7 +186,7 @@ def test_who_reads_nothing_holds_up_neither_the_page_nor_the_rig(shared: Page):
             assert 0 < drained(there) < reader.bytes - 1_000_000
 
 
-def test_a_page_that_died_is_started_again_at_its_address_and_close_ends_it_for_good(shared: Page):
+def test_a_page_that_died_is_started_again_at_its_address_and_close_ends_it_for_good(shared):
     page, url = shared.page, shared.url
     first, folder = page_here(), Path(present(page._folder))
     assert first is not None and folder.exists()
@@ -219,7 +219,7 @@ def test_a_page_that_died_is_started_again_at_its_address_and_close_ends_it_for_
 
 
 @pytest.mark.parametrize("beats", [True, False])
-def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats: bool):
+def test_a_page_that_hangs_is_ended_and_one_that_beats_is_not(beats):
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     killed: list[bool] = []
     now_s = [100.0]

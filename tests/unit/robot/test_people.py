@@ -90,9 +90,7 @@ def found_in(
     ("size", "lefts"),
     [((640, 480), [0.0, 160.0]), ((768, 432), [0.0, 168.0, 336.0]), ((480, 640), [-80.0])],
 )
-def test_people_are_found_where_they_are_in_one_of_the_squares(
-    size: tuple[int, int], lefts: list[float]
-):
+def test_people_are_found_where_they_are_in_one_of_the_squares(size, lefts):
     for x in np.linspace(0.1, 0.9, 7) * size[0]:
         one, *again = [p for some in found_in(size, lefts, (x, 90.0, 200.0, 0.9)) for p in some]
         assert len(again) <= 1
@@ -156,12 +154,12 @@ def test_frames_carry_people_between_processes():
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def folder(tmp_path, monkeypatch) -> Path:
     monkeypatch.setenv(FOLDER_VARIABLE, str(tmp_path))
     return tmp_path
 
 
-def test_a_damaged_file_is_told_once_and_faces_are_found(folder: Path):
+def test_a_damaged_file_is_told_once_and_faces_are_found(folder):
     PEOPLE.path.write_bytes(b"half of it")
     detector = add_body_detection(Faceless(), FaceDetectorParams())
     assert isinstance(detector, BodyDetector)
@@ -184,9 +182,7 @@ class Searching:
 
 
 @pytest.mark.parametrize("rate_hz", [8.0, 30.0])
-def test_a_picture_gets_two_of_the_three_searches_at_most_and_each_has_its_turn(
-    rate_hz: float,
-):
+def test_a_picture_gets_two_of_the_three_searches_at_most_and_each_has_its_turn(rate_hz):
     network, runs = Seen((), 480.0), [0]
     network.left_of = [0.0]
 
@@ -206,7 +202,7 @@ def test_a_picture_gets_two_of_the_three_searches_at_most_and_each_has_its_turn(
     assert network.runs >= 8 and runs[0] >= 16
 
 
-def test_the_doctor_names_what_is_missing(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_doctor_names_what_is_missing(folder, monkeypatch):
     examine_detector = pytest.importorskip("gazerig.features.bringup.cli.doctor").examine_detector
     monkeypatch.setenv("XDG_DATA_HOME", str(folder))
     found = examine_detector(FaceDetectorParams())
@@ -292,7 +288,7 @@ def test_somebody_who_walks_is_looked_at_at_the_upper_end_and_not_at_the_feet():
 
 
 @NEEDS_NETWORK
-def test_a_photographed_person_is_found_and_a_cat_is_none(monkeypatch: pytest.MonkeyPatch):
+def test_a_photographed_person_is_found_and_a_cat_is_none(monkeypatch):
     monkeypatch.setenv(FOLDER_VARIABLE, str(MODELS))
     detector = add_body_detection(Faceless(), FaceDetectorParams(people_hz=30.0))
     assert isinstance(detector, BodyDetector)

@@ -21,7 +21,7 @@ def nodes(server: viser.ViserServer) -> set[str]:
 
 
 @pytest.mark.parametrize("part", ["LE", "RE", "M", "N", "DN", "UP", "FL", "FR"])
-def test_a_person_has_the_parts_of_a_face_where_the_canonical_face_has_them(part: str):
+def test_a_person_has_the_parts_of_a_face_where_the_canonical_face_has_them(part):
     import trimesh  # half a second of a processor, which no other test needs at collection
     from trimesh.proximity import closest_point_naive
 

@@ -52,9 +52,7 @@ def test_a_face_is_as_far_as_the_camera_measures_and_says_so():
         (1.0, None, False),
     ],
 )
-def test_depth_that_is_not_the_faces_is_not_taken(
-    size: float, depth_m: NDArray[Any] | None, believed: bool
-):
+def test_depth_that_is_not_the_faces_is_not_taken(size, depth_m, believed):
     """All have the picture of an adult's face at 1 m."""
     perception = Perception(STILL, 69.0)
     face = face_at((0.0, 0.0, size), size)
@@ -72,7 +70,7 @@ def blob_at(p: Vec3, v: Vec3, known: bool = True, **more: Any) -> MovingBlob:
 
 
 @pytest.mark.parametrize("bad", [np.nan, np.inf])
-def test_what_is_no_number_is_not_taken_in(bad: float):
+def test_what_is_no_number_is_not_taken_in(bad):
     perception = Perception(STILL, 69.0)
     blobs = (
         MovingBlob(1, "thing", (bad, 0.0, 1.0), 0.1),
@@ -103,7 +101,7 @@ def test_who_walks_out_of_the_picture_is_no_longer_seen_but_remembered():
 
 
 @pytest.mark.parametrize(("frames", "waited"), [(1, False), (2, True)])
-def test_a_body_that_is_found_once_is_not_waited_for_as_a_person_is(frames: int, waited: bool):
+def test_a_body_that_is_found_once_is_not_waited_for_as_a_person_is(frames, waited):
     perception = Perception(STILL, 69.0)
     for k in range(1, 25):
         found = seen(perception, k, people=(body_at(0.4),) if k <= frames else ())
@@ -118,7 +116,7 @@ def body_at(x: float) -> DetectedPerson:
 
 
 @pytest.mark.parametrize("sway_m", [0.0, 0.003])
-def test_the_sway_of_who_stands_is_life_and_the_noise_of_a_photo_is_none(sway_m: float):
+def test_the_sway_of_who_stands_is_life_and_the_noise_of_a_photo_is_none(sway_m):
     perception, rng, shown = Perception(STILL, 69.0), np.random.default_rng(1), []
     for k in range(1, 1000):
         face = face_at((sway_m * sin(0.06 * k), 0.0, 1.5))  # 0.3 Hz
@@ -129,7 +127,7 @@ def test_the_sway_of_who_stands_is_life_and_the_noise_of_a_photo_is_none(sway_m:
 
 
 @pytest.mark.parametrize("sway_m", [0.0, 0.5])
-def test_who_has_walked_in_is_a_person_for_a_while_and_a_bottle_is_none(sway_m: float):
+def test_who_has_walked_in_is_a_person_for_a_while_and_a_bottle_is_none(sway_m):
     perception, counted = Perception(STILL, 69.0), 0
     for k in range(1, 900):
         people = (body_at(sway_m * min(k / 30.0, 1.0)),) if k % 15 == 1 else ()

@@ -57,7 +57,7 @@ def face_at(p_world_m: Vec3) -> Face:
 
 
 @pytest.mark.parametrize("yaw_rad", [-0.5, 0.0, 0.4])
-def test_a_click_on_a_face_is_at_the_face(yaw_rad: float):
+def test_a_click_on_a_face_is_at_the_face(yaw_rad):
     # Somebody before the camera as it stood when the picture was taken.
     there: Vec3 = (0.9 * np.cos(yaw_rad), 0.9 * np.sin(yaw_rad) + 0.05, 0.22)
     point_at, mount, poses = looking((yaw_rad, 0.0, 0.0), Percept(1.0, Bodies(), (face_at(there),)))

@@ -1,16 +1,22 @@
-"""A part of a package that fails ends the run, named and with torque off."""
+"""A part of a package that fails ends the run, named and with torque off; one that hangs limps."""
 
 import json
+import subprocess
+import threading
+import time
 from collections.abc import Callable, Iterator
-from math import nan
+from functools import partial
+from math import inf, nan
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
-from loop_deaths import rig_of
+from branch import Branch
+from loop_deaths import PATIENCE_S, Driven, rig_of
 from outside_bus import HEAD, install_example
 from outside_package import install, on_path
+from slow_rigs import at_rate
 
 import gazerig
 from gazerig.config.parameters import apply_changes
@@ -93,7 +99,7 @@ def end_of_run(
 
 @pytest.mark.usefixtures("odd")
 @pytest.mark.parametrize("kind", ["feetech", "maestro", "lx16a"])
-def test_a_rule_that_raises_ends_the_run(kind: str, monkeypatch: pytest.MonkeyPatch):
+def test_a_rule_that_raises_ends_the_run(kind, monkeypatch):
     rig = load_rig(str(HEAD)) if kind == "lx16a" else rig_of(kind)
     rig = apply_changes(rig, {"gaze.chooser": "odd"})
     ended, lines, held = end_of_run(rig, monkeypatch, scene="visitor")
@@ -103,7 +109,7 @@ def test_a_rule_that_raises_ends_the_run(kind: str, monkeypatch: pytest.MonkeyPa
 
 @pytest.mark.usefixtures("odd")
 @pytest.mark.parametrize("part", ["camera", "detector", "bus"])
-def test_another_part_that_raises_ends_the_run(part: str, monkeypatch: pytest.MonkeyPatch):
+def test_another_part_that_raises_ends_the_run(part, monkeypatch):
     rig, options, label = load_rig("desk"), dict[str, Any](scene="visitor"), "odd 1.2"
     match part:
         case "camera":
@@ -121,12 +127,57 @@ def test_another_part_that_raises_ends_the_run(part: str, monkeypatch: pytest.Mo
 
 
 def test_a_rule_that_returns_no_point_ends_the_run():
-    rule: Any = SimpleNamespace(choose=lambda *_: (nan, 0.0, 0.0))
-    with (
-        pytest.raises(gazerig.HeadEnded, match="attention SimpleNamespace of the program"),
-        gazerig.open("desk", fast=True, attention=rule) as head,
-    ):
-        head.sleep(1.0)
+    for answer in ((nan, 0.0, 0.0), (1.0, inf, 0.0), (1.0, 0.0), "abc", 7):
+        rule: Any = SimpleNamespace(choose=lambda *_, answer=answer: answer)
+        with (
+            pytest.raises(gazerig.HeadEnded, match="attention SimpleNamespace of the program"),
+            gazerig.open("desk", fast=True, attention=rule) as head,
+        ):
+            head.sleep(1.0)
+
+
+# --- parts that hang
+
+
+def wait(*_: object) -> None:
+    threading.Event().wait()
+
+
+class Hanging:
+    """A rule that hangs after some ticks."""
+
+    ticks = 0
+
+    def choose(self, *_: object) -> Any:
+        self.ticks += 1
+        if self.ticks == 10:
+            print("moving", flush=True)
+        if self.ticks > 25:
+            wait()
+
+
+def _hang(path: str, file: str) -> None:
+    with gazerig.open(file, port=path, attention=Hanging(), say=lambda line: None):
+        time.sleep(2.0 * PATIENCE_S)
+
+
+def test_a_rule_that_hangs_leaves_limp_servos(tmp_path):
+    file = at_rate(tmp_path, "feetech", 50.0)
+    rig = load_rig(file)
+    with PtyBuses() as buses:
+        (path,) = buses.start(emulated_lines(rig)).values()
+        loop = Branch(partial(_hang, path, file), stdout=subprocess.PIPE, text=True)
+        late = threading.Timer(2.0 * PATIENCE_S, loop.kill)
+        late.start()
+        try:
+            it = Driven(loop, buses, frozenset(joint.id for joint in rig.joints.values()))
+            it.line("moving")
+            assert any(it.holding())
+            assert it.limp_after_s(time.monotonic(), PATIENCE_S) is not None
+        finally:
+            late.cancel()
+            loop.kill()
+            loop.communicate()
 
 
 # --- values of a package's bus

@@ -44,9 +44,7 @@ class Head:
         (BusLost("gone"), "", "gone"),
     ],
 )  # fmt: skip
-def test_whatever_ends_work_or_parking_the_torque_goes_off(
-    error: BaseException, cause: str, what: str
-):
+def test_whatever_ends_work_or_parking_the_torque_goes_off(error, cause, what):
     head, stuck = Head(), Head()
     with pytest.raises(type(error)), head.way_out() as leaving:
         assert leaving.switch_on(lambda: 7) == 7

@@ -24,7 +24,7 @@ def _lowered(group: Path, leads: bool) -> list[str]:
 
 
 @pytest.mark.parametrize("leads", [True, False])
-def test_a_process_is_lowered_within_its_session_and_with_it(tmp_path: Path, leads: bool):
+def test_a_process_is_lowered_within_its_session_and_with_it(tmp_path, leads):
     group = tmp_path / "autogroup"
     group.touch()
     nice = str(os.getpriority(os.PRIO_PROCESS, 0) + 4)

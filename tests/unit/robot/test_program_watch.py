@@ -71,7 +71,7 @@ HUNG = "guardian: no heartbeat of the control loop for {} s"
 DIED = "guardian: the program died"
 
 
-def test_servos_are_released_four_tenths_after_the_last_heartbeat(monkeypatch: pytest.MonkeyPatch):
+def test_servos_are_released_four_tenths_after_the_last_heartbeat(monkeypatch):
     it = Watched(monkeypatch, silent_s=1.01, dies_s=2.0)
     it.unusable, it.unconfirmed = 1, (1, 2)
     it.program.arm(0, True)
@@ -87,7 +87,7 @@ def test_servos_are_released_four_tenths_after_the_last_heartbeat(monkeypatch: p
     assert it.program.checks == 99  # one each 20 ms until its program has ended
 
 
-def test_a_plan_is_released_once_until_the_loop_has_noticed(monkeypatch: pytest.MonkeyPatch):
+def test_a_plan_is_released_once_until_the_loop_has_noticed(monkeypatch):
     it = Watched(monkeypatch, silent_s=0.0, dies_s=9.0)
     # Its pipe is held open by a child.
     monkeypatch.setattr(os, "getppid", lambda: 1 if it.clock.now_s() < 3.0 else 2)
@@ -98,9 +98,7 @@ def test_a_plan_is_released_once_until_the_loop_has_noticed(monkeypatch: pytest.
     assert it.said == [f"{DIED}: pulses off on 1 channel of /tmp/b"]
 
 
-def test_servos_of_a_dead_program_are_released_and_an_unplugged_adaptor_is_waited_for(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_servos_of_a_dead_program_are_released_and_an_unplugged_adaptor_is_waited_for(monkeypatch):
     it = Watched(monkeypatch, silent_s=1e9, dies_s=1.0)
     it.unusable = 1000
     for plan in (0, 1):

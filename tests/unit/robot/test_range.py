@@ -95,7 +95,7 @@ def calls(see: Perception, poses: object, found: Detections) -> int:
 
 @pytest.mark.parametrize("swings", [False, True])
 @pytest.mark.parametrize("noise_deg", (1.0, 2.0, 3.0))
-def test_e81_range_stays_as_assumed_whatever_the_direction_does(noise_deg: float, swings: bool):
+def test_e81_range_stays_as_assumed_whatever_the_direction_does(noise_deg, swings):
     ratios = still_thing(noise_deg, swings, 150, seed=1)
     assert ratios.min() >= 0.95 and ratios.max() <= 1.05
 

@@ -25,7 +25,7 @@ from gazerig.drivers.errors import SetupError
 from gazerig.robot.loop import body
 from gazerig.robot.loop.events import TickFeed
 from gazerig.robot.loop.loop import Robot, Tick
-from gazerig.robot.model.commands import Get, ReadMenus, Request, Resume, Stop, Value
+from gazerig.robot.model.commands import Get, ReadMenus, Request, Resume, Stop
 from gazerig.robot.net import client
 from gazerig.robot.net import socket_io as remote_socket
 from gazerig.robot.net import socket_server as server_module
@@ -91,7 +91,7 @@ def hung_up(end: socket.socket) -> bool:
 
 
 @pytest.fixture
-def folder(monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def folder(monkeypatch) -> Iterator[Path]:
     """A folder for sockets of this test alone; pytest's own are too long for a socket."""
     place = tempfile.mkdtemp(prefix="gz-", dir="/tmp")
     monkeypatch.setenv("XDG_RUNTIME_DIR", place)
@@ -126,7 +126,7 @@ def rig(folder: Path, beat: Beat, errors: list[str]) -> Iterator[RobotClient]:
 # The socket
 
 
-def test_the_socket_is_the_owners_alone(rig: RobotClient, folder: Path):
+def test_the_socket_is_the_owners_alone(rig, folder):
     path = folder / f"{os.getpid()}.sock"
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert stat.S_IMODE(folder.stat().st_mode) == 0o700
@@ -143,7 +143,7 @@ def beatless() -> RequestHandler:
     return RequestHandler(run, TickFeed(), {"rig": "other"})
 
 
-def test_close_removes_it_and_hangs_up(folder: Path):
+def test_close_removes_it_and_hangs_up(folder):
     server = open_server()
     path = server.open()
     with remote_socket.connect_to_socket(path, 1.0) as end:
@@ -155,7 +155,7 @@ def test_close_removes_it_and_hangs_up(folder: Path):
     assert "remote control" not in names
 
 
-def test_a_folder_open_to_others_is_refused_by_both_sides(folder: Path):
+def test_a_folder_open_to_others_is_refused_by_both_sides(folder):
     folder.mkdir(mode=0o700)
     folder.chmod(0o777)
     with pytest.raises(SetupError, match="not a private folder of yours"):
@@ -164,7 +164,7 @@ def test_a_folder_open_to_others_is_refused_by_both_sides(folder: Path):
     assert connect_to_all() == []
 
 
-def test_a_folder_of_somebody_else_is_refused(folder: Path):
+def test_a_folder_of_somebody_else_is_refused(folder):
     folder.mkdir(mode=0o700)
     assert remote_socket.is_private(folder, os.getuid())
     assert not remote_socket.is_private(folder, os.getuid() + 1)
@@ -191,9 +191,7 @@ def listening() -> Iterator[subprocess.Popen[str]]:
         process.communicate()
 
 
-def test_a_killed_rig_leaves_a_socket_that_is_no_rig_and_that_the_next_removes(
-    folder: Path,
-):
+def test_a_killed_rig_leaves_a_socket_that_is_no_rig_and_that_the_next_removes(folder):
     with listening() as killed:
         pass
     dead = folder / f"{killed.pid}.sock"
@@ -213,7 +211,7 @@ def test_a_killed_rig_leaves_a_socket_that_is_no_rig_and_that_the_next_removes(
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), object(), b"1"])
-def test_what_has_no_json_is_refused_before_it_is_sent(rig: RobotClient, value: Value):
+def test_what_has_no_json_is_refused_before_it_is_sent(rig, value):
     with pytest.raises(RequestRejected, match="finite numbers"):
         rig.set_many({RATE: value})
     assert rig.get(RATE) == {RATE: 200.0}
@@ -222,9 +220,7 @@ def test_what_has_no_json_is_refused_before_it_is_sent(rig: RobotClient, value: 
 # A loop that hangs, a resume that fails
 
 
-def test_a_loop_that_hangs_is_told_to_who_stops(
-    folder: Path, beat: Beat, errors: list[str], rig: RobotClient
-):
+def test_a_loop_that_hangs_is_told_to_who_stops(folder, beat, errors, rig):
     beat.hold.set()
     try:
         with pytest.raises(RequestRejected, match="emergency stop"):
@@ -236,7 +232,7 @@ def test_a_loop_that_hangs_is_told_to_who_stops(
 
 
 def test_an_error_of_the_program_is_told_to_both_sides_and_the_rest_goes_on(
-    rig: RobotClient, errors: list[str], monkeypatch: pytest.MonkeyPatch
+    rig, errors, monkeypatch
 ):
     with monkeypatch.context() as patch, pytest.raises(ConnectionLost, match="AttributeError"):
         patch.delattr(ParamStore, "get")
@@ -273,9 +269,7 @@ def line_of(end: socket.socket) -> dict[str, Any]:
         (b'{"do": "tune", "changes": [["a", 1]]}\n', "request set, which checks it"),
     ],
 )
-def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(
-    rig: RobotClient, folder: Path, line: bytes, words: str
-):
+def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(rig, folder, line, words):
     with raw(folder) as end:
         end.sendall(line)
         answer = line_of(end)
@@ -285,9 +279,7 @@ def test_rubbish_is_refused_in_words_and_the_next_request_is_heard(
         assert line_of(end) == {"ok": rig.ask(ReadMenus(), dict[str, list[str]])}
 
 
-def test_an_endless_request_is_refused_and_hung_up_on(
-    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_an_endless_request_is_refused_and_hung_up_on(rig, folder, monkeypatch):
     monkeypatch.setattr("gazerig.robot.net.socket_server._REST_S", 0.2)
     with raw(folder) as end:
         end.sendall(b'{"do": "menus"}\n')
@@ -308,9 +300,7 @@ def test_an_endless_request_is_refused_and_hung_up_on(
         assert "no end of the line" in answer["refused"]
 
 
-def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
-    rig: RobotClient, folder: Path, beat: Beat, monkeypatch: pytest.MonkeyPatch
-):
+def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(rig, folder, beat, monkeypatch):
     monkeypatch.setattr("gazerig.robot.net.socket_server._TAKES_S", 0.2)
     with raw(folder) as end:
         ticks = len(beat.ticks)
@@ -327,7 +317,7 @@ def test_who_reads_no_answers_is_hung_up_on_and_delays_nobody(
 # Leads of programs, and floods
 
 
-def test_nobody_passes_himself_off_as_another(rig: RobotClient, folder: Path):
+def test_nobody_passes_himself_off_as_another(rig, folder):
     with raw(folder) as end:
         stop = {"do": "stop", "why": "x", "who": "the page"}
         end.sendall(json.dumps(stop).encode() + b"\n")
@@ -339,9 +329,7 @@ def test_nobody_passes_himself_off_as_another(rig: RobotClient, folder: Path):
     rig.send(Resume(confirmed=True))
 
 
-def test_programs_of_other_users_are_hung_up_on(
-    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_programs_of_other_users_are_hung_up_on(rig, folder, monkeypatch):
     rig.get(RATE)  # let in
     own = os.getuid()
     with monkeypatch.context() as patch:
@@ -351,9 +339,7 @@ def test_programs_of_other_users_are_hung_up_on(
     assert rig.get(RATE) == {RATE: 200.0}
 
 
-def test_who_takes_too_much_waits_and_is_refused_but_a_stop_goes_through(
-    rig: RobotClient, monkeypatch: pytest.MonkeyPatch
-):
+def test_who_takes_too_much_waits_and_is_refused_but_a_stop_goes_through(rig, monkeypatch):
     rig.get(RATE)  # let in with the usual rate
     monkeypatch.setattr(server_module, "EACH", (1e-6, 0.0))
     with RobotClient.connect() as greedy:  # its greeting takes all
@@ -377,9 +363,7 @@ def lines_until(end: socket.socket, right: Callable[[dict[str, Any]], bool]) -> 
     return found
 
 
-def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(
-    rig: RobotClient, folder: Path, beat: Beat
-):
+def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(rig, folder, beat):
     """A resume before the stop does not follow it, and all is answered in its order."""
     with raw(folder) as end:
         ticks, count = len(beat.ticks), 2000
@@ -398,9 +382,7 @@ def test_a_stop_does_not_wait_for_what_its_program_has_sent_before(
     rig.send(Resume(confirmed=True))
 
 
-def test_a_resume_from_before_a_stop_is_not_executed_after_it(
-    rig: RobotClient, folder: Path, beat: Beat
-):
+def test_a_resume_from_before_a_stop_is_not_executed_after_it(rig, folder, beat):
     rig.send(Stop("a hand"))
     with raw(folder) as end:
         resume = b'{"do": "resume", "confirmed": true, "tag": "r"}\n'
@@ -413,9 +395,7 @@ def test_a_resume_from_before_a_stop_is_not_executed_after_it(
     rig.send(Resume(confirmed=True))
 
 
-def test_who_sends_far_too_much_is_hung_up_on_after_his_stop(
-    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_who_sends_far_too_much_is_hung_up_on_after_his_stop(rig, folder, monkeypatch):
     monkeypatch.setattr(server_module, "REST_S", 1.5)
     with raw(folder) as end:
         over = threading.Event()
@@ -440,9 +420,7 @@ def test_who_sends_far_too_much_is_hung_up_on_after_his_stop(
 
 
 @pytest.mark.parametrize("stop", [STOP, b'{"do": "st\\u006fp", "why": "at last"}\n'])
-def test_the_last_message_before_the_end_of_a_burst_may_be_a_stop(
-    rig: RobotClient, folder: Path, stop: bytes
-):
+def test_the_last_message_before_the_end_of_a_burst_may_be_a_stop(rig, folder, stop):
     with raw(folder) as end:
         end.sendall(3000 * LEVEL + stop)
     stop_s = time.monotonic() + 20.0
@@ -452,9 +430,7 @@ def test_the_last_message_before_the_end_of_a_burst_may_be_a_stop(
     rig.send(Resume(confirmed=True))
 
 
-def test_a_client_of_another_version_is_told_so_once_and_may_stop(
-    rig: RobotClient, folder: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_client_of_another_version_is_told_so_once_and_may_stop(rig, folder, monkeypatch):
     with raw(folder) as end:
         wire = remote_socket.Wire(end, remote_socket.ANSWER_BYTES)
         wire.write({"do": "hello", "version": 1, "tag": "a"}, 5.0)
@@ -473,9 +449,7 @@ def test_a_client_of_another_version_is_told_so_once_and_may_stop(
     rig.send(Resume(confirmed=True))
 
 
-def test_a_stop_does_not_wait_for_another_thread_of_its_program(
-    rig: RobotClient, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_stop_does_not_wait_for_another_thread_of_its_program(rig, monkeypatch):
     """Like that of a head that is speaking: the answer to say comes when it begins."""
     perform, asked, over = RequestHandler.perform, threading.Event(), threading.Event()
 

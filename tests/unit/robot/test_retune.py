@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from math import isfinite, pi
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import msgspec
@@ -157,7 +156,7 @@ COLLISION: dict[str, Value] = {
 
 
 @pytest.fixture
-def walk(tmp_path: Path) -> str:
+def walk(tmp_path) -> str:
     """Return a walk that begins elsewhere."""
     text = shipped_path("scanpaths", shipped_names("scanpaths")[0]).read_text(encoding="utf-8")
     path = tmp_path / "walk.yaml"
@@ -171,7 +170,7 @@ def live_knobs() -> tuple[Parameter, ...]:
 
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed: int, walk: str):
+def test_every_knob_at_any_time_keeps_every_limit_on_the_bus(seed, walk):
     dice = np.random.default_rng(seed)
     running = started(("visitor", "boxing", "face-to-face")[seed])
     running.go(100)

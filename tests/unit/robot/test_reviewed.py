@@ -20,7 +20,7 @@ NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e-?\d+)?(?![\w.])")
 
 
 @pytest.mark.parametrize("name", ["expressive", "minimal"])
-def test_every_number_of_a_description(name: str):
+def test_every_number_of_a_description(name):
     """In thousandths: millimetres, grams and milliradians."""
     description = description_of(shipped(name))
     lines = (mjcf(description).xml + urdf(description).xml).splitlines()

@@ -81,7 +81,7 @@ def page(ran: FeedRun) -> Iterator[Page]:
     one.close()
 
 
-def test_states_and_events_are_those_of_the_ticks_themselves(ran: FeedRun, page: Page):
+def test_states_and_events_are_those_of_the_ticks_themselves(ran, page):
     page.comes_up()
     direct = TickFeed()
     events: list[HeadEvent] = []
@@ -101,7 +101,7 @@ def test_states_and_events_are_those_of_the_ticks_themselves(ran: FeedRun, page:
     assert page.said == ["the page is at http://127.0.0.1:9/?token=x"]
 
 
-def test_the_servos_silences_are_counted_and_what_is_seen_is_told(ran: FeedRun, page: Page):
+def test_the_servos_silences_are_counted_and_what_is_seen_is_told(ran, page):
     page.comes_up()
     silent = structs.replace(ran.ticks[3].joints, missing=("eyes_pan",))
     for tick in (*ran.ticks[:3], structs.replace(ran.ticks[3], joints=silent)):
@@ -113,9 +113,7 @@ def test_the_servos_silences_are_counted_and_what_is_seen_is_told(ran: FeedRun, 
     assert "face 1 at" in run.perception or "no frame" in run.perception
 
 
-def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_another(
-    ran: FeedRun, page: Page
-):
+def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_another(ran, page):
     for tick in ran.ticks[:100]:
         page.stream.update(tick)
     assert page.newest() is None and page.rigs == 0
@@ -129,9 +127,7 @@ def test_nothing_is_sent_before_the_page_is_there_and_everything_again_to_anothe
         assert len(present(tick.percept).faces) == 1, "the percept in force comes again"
 
 
-def test_a_picture_comes_once_with_what_was_seen_and_where_the_head_looked(
-    ran: FeedRun, page: Page
-):
+def test_a_picture_comes_once_with_what_was_seen_and_where_the_head_looked(ran, page):
     page.comes_up()
     assert page.live.picture() is None
     page.stream.update(ran.ticks[-1])
@@ -153,7 +149,7 @@ def test_a_picture_comes_once_with_what_was_seen_and_where_the_head_looked(
     assert shown.min() > 250
 
 
-def test_a_page_that_takes_nothing_delays_nothing_and_is_counted(ran: FeedRun, page: Page):
+def test_a_page_that_takes_nothing_delays_nothing_and_is_counted(ran, page):
     page.comes_up()
     for n in range(3):
         for tick in ran.ticks:

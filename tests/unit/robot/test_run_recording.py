@@ -26,7 +26,7 @@ from jsonschema import Draft202012Validator
 from made_ticks import made_tick
 from mcap.reader import make_reader
 from mcap.writer import Writer
-from recorded_run import STARTED, Recorded, exact, info_for
+from recorded_run import STARTED, exact, info_for
 
 from gazerig.drivers.errors import SetupError
 from gazerig.drivers.types import Detections
@@ -54,7 +54,7 @@ def picked_s(rate_hz: float, times_s: Iterable[float]) -> list[float]:
     ]
 
 
-def test_other_programs_open_it(recorded: Recorded):
+def test_other_programs_open_it(recorded):
     with recorded.path.open("rb") as file:
         reader = make_reader(file, validate_crcs=True)
         summary = reader.get_summary()
@@ -99,7 +99,7 @@ def write_ticks(path: Path, ticks: Iterable[Tick]) -> Path:
     return path
 
 
-def test_any_tick_comes_back(tmp_path: Path):
+def test_any_tick_comes_back(tmp_path):
     ticks = []
     for odd in (0.25, nan, -inf):
         track = TrackState("nod", "", 0.5, 1.0, owns=("jaw",), who="somebody", number=2)
@@ -124,7 +124,7 @@ def test_any_tick_comes_back(tmp_path: Path):
         ("started_utc", "yesterday"),
     ],
 )
-def test_a_beginning_that_no_run_has_is_refused(name: str, nonsense: object):
+def test_a_beginning_that_no_run_has_is_refused(name, nonsense):
     ((key, text),) = as_text(info_for()).items()
     assert read_text({key: text}, RunInfo) == info_for()
     wrong = json.dumps({**json.loads(text), name: nonsense})
@@ -144,7 +144,7 @@ def test_a_late_frame_does_not_delay_those_that_follow():
 # --- what cannot be read
 
 
-def test_a_recording_cut_anywhere_opens_and_keeps_what_is_whole(recorded: Recorded, tmp_path: Path):
+def test_a_recording_cut_anywhere_opens_and_keeps_what_is_whole(recorded, tmp_path):
     data = recorded.path.read_bytes()
     cut = tmp_path / "cut.mcap"
     counts = []
@@ -160,7 +160,7 @@ def test_a_recording_cut_anywhere_opens_and_keeps_what_is_whole(recorded: Record
     assert counts == sorted(counts, reverse=True) and counts[-1] < 299
 
 
-def test_time_that_runs_back_or_leaps_is_no_run(tmp_path: Path):
+def test_time_that_runs_back_or_leaps_is_no_run(tmp_path):
     for number, (t_s, right) in enumerate(
         ((5.0, True), (3604.9, True), (4.99, False), (3605.0, False))
     ):
@@ -181,7 +181,7 @@ def written(path: Path, profile: str) -> Path:
     return path
 
 
-def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path):
+def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path):
     (tmp_path / "text").write_text("not at all a recording")
     (tmp_path / "empty").touch()
     wrong = {
@@ -200,7 +200,7 @@ def test_what_is_no_recording_of_a_run_is_refused_in_one_line(tmp_path: Path):
         assert "\n" not in str(found.value)
 
 
-def test_a_file_is_not_written_over_unasked(tmp_path: Path):
+def test_a_file_is_not_written_over_unasked(tmp_path):
     there = tmp_path / "there.mcap"
     there.write_text("precious")
     with pytest.raises(SetupError, match="already exists: name another file, or use --force"):
@@ -215,7 +215,7 @@ def test_a_file_is_not_written_over_unasked(tmp_path: Path):
 # --- what goes wrong while it runs
 
 
-def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk: None, tmp_path: Path):
+def test_a_full_disk_ends_the_recording_and_not_the_run(small_disk, tmp_path):
     path = tmp_path / "full.mcap"
     recorder = Recorder(path, info_for(), patient=True)
     recorder.open()
@@ -251,7 +251,7 @@ def writing(path: Path) -> tuple[Recorder, Run, Any]:
     return recorder, made, recorder._link.process
 
 
-def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path):
+def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path):
     path = tmp_path / "late.mcap"
     recorder, made, process = writing(path)
     process.send_signal(19)  # SIGSTOP
@@ -267,9 +267,7 @@ def test_a_writer_that_stops_delays_nothing_and_loses_nothing(tmp_path: Path):
     assert list(map(exact, back)) == list(map(exact, seen))
 
 
-def test_what_the_queue_cannot_hold_is_lost_and_counted(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_what_the_queue_cannot_hold_is_lost_and_counted(tmp_path, monkeypatch):
     monkeypatch.setattr("gazerig.robot.recording.recorder.QUEUE_BYTES", 150_000)
     path = tmp_path / "lost.mcap"
     recorder, made, process = writing(path)
@@ -286,7 +284,7 @@ def test_what_the_queue_cannot_hold_is_lost_and_counted(
     assert len(list(recording.ticks())) == 400 - recorder.lost
 
 
-def test_a_writer_that_dies_is_told_once_and_the_run_goes_on(tmp_path: Path):
+def test_a_writer_that_dies_is_told_once_and_the_run_goes_on(tmp_path):
     recorder, made, process = writing(tmp_path / "dead.mcap")
     process.kill()
     process.wait()
@@ -352,7 +350,7 @@ class Killed:
 
 
 @pytest.mark.parametrize("both", [False, True], ids=["rig", "rig and writer"])
-def test_a_killed_rig_leaves_a_recording(tmp_path: Path, both: bool):
+def test_a_killed_rig_leaves_a_recording(tmp_path, both):
     path = tmp_path / "killed.mcap"
     killed = Killed(path, both)
     recording = RunRecording(path)
@@ -369,9 +367,7 @@ def test_a_killed_rig_leaves_a_recording(tmp_path: Path, both: bool):
 # --- The process that writes a recording
 
 
-def test_what_is_written_is_put_on_the_disk_every_second(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_what_is_written_is_put_on_the_disk_every_second(tmp_path, monkeypatch):
     clock, at_s = SimulatedClock(), list[float]()
     monkeypatch.setattr(os, "fdatasync", lambda fd: at_s.append(clock.now_s()))
 

@@ -46,7 +46,7 @@ def reason_of(verdict: GuardResult, joint: str) -> str:
 
 
 @pytest.mark.parametrize("joint", EACH_KIND)
-def test_range_is_swept_densely_at_its_edges(joint: int):
+def test_range_is_swept_densely_at_its_edges(joint):
     limit = LIMITS[joint]
     for edge in (limit.low_rad, limit.high_rad):
         for off in [*np.linspace(-0.01, 0.01, 41).tolist(), -1e-12, 1e-12, -2e-9, 2e-9]:
@@ -63,7 +63,7 @@ WISHES = "0.0375 | 0.0376 too_hard | 0.999 too_hard | 1.001 too_fast | 50.1 out_
 
 @pytest.mark.parametrize("case", WISHES.split("|"))
 @pytest.mark.parametrize("way", [1.0, -1.2])
-def test_a_wish_is_shortened_for_one_reason(case: str, way: float):
+def test_a_wish_is_shortened_for_one_reason(case, way):
     off, _, reason = case.strip().replace("_", " ").partition(" ")
     wish = radians(float(off)) * (way if reason == "out of range" else way / abs(way))
     (verdict,) = driven(guarding(), [but(6, wish)])
@@ -71,6 +71,56 @@ def test_a_wish_is_shortened_for_one_reason(case: str, way: float):
     moved = min(abs(wish), radians(0.0375)) * way / abs(way)
     assert verdict.command_rad == pytest.approx(but(6, moved), abs=1e-12)
     assert verdict.level == ("limited" if reason else "ok")
+
+
+@pytest.mark.parametrize("joint", EACH_KIND)
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_speed_is_swept_densely_at_its_limit(joint, way):
+    soft = tuple(limit._replace(accel_rad_s2=1e9) for limit in LIMITS)
+    for share in [*np.linspace(0.95, 1.05, 21).tolist(), 1.0 - 1e-12, 1.0 + 1e-6]:
+        step = way * LIMITS[joint].speed_rad_s * DT * share
+        verdict = driven(guarding(limits=soft), [but(joint, step)])[0]
+        assert abs(verdict.command_rad[joint]) <= abs(step / share) * (1.0 + 1e-12)
+        assert (reason_of(verdict, GAZE_JOINTS[joint]) == "too fast") == (share > 1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("joint", EACH_KIND)
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_acceleration_is_swept_densely_at_its_limit(joint, way):
+    for share in [*np.linspace(0.95, 1.05, 21).tolist(), 1.0 - 1e-12]:
+        step = way * LIMITS[joint].accel_rad_s2 * DT * DT * share
+        verdict = driven(guarding(), [but(joint, step)])[0]
+        assert abs(verdict.command_rad[joint]) <= abs(step / share) * (1.0 + 1e-12)
+        assert (reason_of(verdict, GAZE_JOINTS[joint]) == "too hard") == (share > 1.0 + 1e-9)
+
+
+@pytest.mark.parametrize("joint", EACH_KIND)
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_braking_before_the_end_of_the_range_is_swept_densely(joint, way):
+    limit = LIMITS[joint]
+    edge = limit.high_rad if way > 0.0 else limit.low_rad
+    for share in np.linspace(0.1, 1.0, 10).tolist():
+        pace = way * limit.speed_rad_s * share * DT
+        began = int(0.9 * (limit.high_rad - limit.low_rad) / abs(pace))
+        guard = guarding(but(joint, edge - began * pace))
+        wishes = [but(joint, edge + (k - began) * pace) for k in range(began + 40)]
+        path = np.array([verdict.command_rad[joint] for verdict in driven(guard, wishes)])
+        speeds = np.diff(path, prepend=edge - began * pace) / DT
+        assert (np.abs(np.diff(speeds, prepend=0.0)) <= limit.accel_rad_s2 * DT + 1e-6).all()
+        assert (way * path <= way * edge).all() and abs(path[-1] - edge) < 1e-3
+
+
+@pytest.mark.parametrize("joint", [0, 6])
+@pytest.mark.parametrize("tick", [0.001, 0.005, 0.02, 0.1])
+def test_a_wish_that_jumps_is_met_without_running_past_it(joint, tick):
+    for jump in np.linspace(-0.5, 0.5, 5).tolist():
+        guard, t, path = guarding(), 0.0, [0.0]
+        for _ in range(max(40, int(1.5 / tick))):
+            t += tick
+            state = joints_at(but(joint, path[-1]), t)
+            path.append(guard.check(but(joint, jump), state, 0.0, t).command_rad[joint])
+        assert path[-1] == pytest.approx(jump, abs=1e-9)
+        assert max(abs(p) for p in path) <= abs(jump) + LIMITS[joint].accel_rad_s2 * tick**2
 
 
 def test_not_finite_wishes_hold_and_say_so():
@@ -82,7 +132,7 @@ def test_not_finite_wishes_hold_and_say_so():
 
 
 @pytest.mark.parametrize("joint", EACH_KIND)
-def test_ages_of_joints_and_picture_are_swept_densely(joint: int):
+def test_ages_of_joints_and_picture_are_swept_densely(joint):
     for off in [*np.linspace(-0.01, 0.01, 21).tolist(), -1e-6, 1e-6, inf, nan]:
         guard, t = guarding(), 1.0
         ages = joints_at(ZERO, t, measured_s=but(joint, t - 0.15 - off, t))
@@ -111,6 +161,21 @@ def test_it_starts_slowly_from_where_the_joints_are_until_each_has_met_its_wish(
     assert t == pytest.approx(1.0, abs=1.1 * DT)
     assert all(b <= a + SLACK for a, b in pairwise(path))
     assert driven(guard, [(0.3,) * 9] * 100, t)[-1].command_rad[0] == pytest.approx(0.3)
+
+
+def test_going_gently_in_flight_brakes_within_the_joints_own_strength():
+    path: list[Any] = []
+    guard, t = guarding(), 0.0
+    for k in range(60):
+        t += DT
+        if k == 15:
+            guard.start_gently()
+        position = (0.0,) * 6 + ((path[-1] if path else 0.0),) * 3
+        desired = (0.0,) * 6 + (0.8,) * 3
+        path.append(guard.check(desired, joints_at(position, t), 0.0, t).command_rad[6])
+    speeds = np.diff(path) / DT
+    assert np.abs(np.diff(speeds)).max() / DT <= NECK.accel_rad_s2 + 1e-6
+    assert speeds[-1] <= radians(60.0) + 1e-9
 
 
 def test_time_that_stands_still_moves_nothing():
@@ -168,7 +233,7 @@ class World:
 
 @pytest.mark.parametrize("joint", EACH_KIND)
 @pytest.mark.parametrize("lag_s", [0.0, 0.015, 0.03])
-def test_a_jammed_joint_is_found_within_200_ms_and_let_go(joint: int, lag_s: float):
+def test_a_jammed_joint_is_found_within_200_ms_and_let_go(joint, lag_s):
     world = World(joint, lag_s)
     for _ in range(20):
         world.tick(0.0)
@@ -230,7 +295,7 @@ def test_it_tries_again_slowly_and_pushes_weakly_until_the_way_is_free():
 @pytest.mark.parametrize("joint", [0, 4, 6])
 @pytest.mark.parametrize("lag_s", [0.0, 0.015, 0.03])
 @pytest.mark.parametrize("band_deg", [0.0, 0.6, 1.0])
-def test_healthy_joints_are_left_alone(joint: int, lag_s: float, band_deg: float):
+def test_healthy_joints_are_left_alone(joint, lag_s, band_deg):
     world = World(joint, lag_s, band_deg)
     rng = np.random.default_rng(5)
     desired = 0.0
@@ -248,6 +313,15 @@ def test_healthy_joints_are_left_alone(joint: int, lag_s: float, band_deg: float
         assert world.tick(desired, silent, dt_s) != "not moving"
 
 
+def test_a_slow_start_is_no_jam():
+    world = World(6, 0.03, 0.6)
+    world.guard.start_gently()
+    for k in range(600):
+        if k == 300:
+            world.guard.start_gently()
+        assert world.tick(0.5 if k < 300 else -0.5) != "not moving"
+
+
 def test_a_silent_joint_is_stale_and_not_stuck():
     world = World(6)
     world.tick(0.0)
@@ -261,6 +335,18 @@ def test_a_silent_joint_is_stale_and_not_stuck():
 
 JOINT = 6
 NAME = GAZE_JOINTS[JOINT]
+
+
+def test_a_stuck_joint_lets_the_others_move():
+    guard = guarding(gentle=True)
+    command: tuple[float, ...] = ZERO
+    verdict = None
+    for k in range(1, 500):
+        joints = joints_at((0.0, *command[1:]), k * DT)
+        verdict = guard.check((0.3,) * 9, joints, 0.0, k * DT)
+        command = verdict.command_rad
+    assert verdict is not None and command[1:] == pytest.approx((0.3,) * 8)
+    assert abs(command[0]) < radians(4.6)
 
 
 class ServoWorld:
@@ -307,7 +393,7 @@ def world() -> ServoWorld:
 
 
 @pytest.mark.parametrize("celsius", np.linspace(50.0, 75.0, 26).tolist())
-def test_heat_slows_a_joint_down_before_it_stops_it(world: ServoWorld, celsius: float):
+def test_heat_slows_a_joint_down_before_it_stops_it(world, celsius):
     small = [world.tick(1e-4, temperature_c=celsius).level for _ in range(40)]
     assert small[-1] == ("ok" if celsius < 65.0 else "hold")
     verdicts = [world.tick(0.5, temperature_c=celsius) for _ in range(60)]
@@ -325,13 +411,13 @@ def test_heat_slows_a_joint_down_before_it_stops_it(world: ServoWorld, celsius: 
     assert verdicts[5].level == "limited"
 
 
-def test_a_hot_joint_goes_on_slowly_when_it_has_cooled(world: ServoWorld):
+def test_a_hot_joint_goes_on_slowly_when_it_has_cooled(world):
     said = [66.0, 65.0, 64.0, 63.0, 62.0]
     verdicts = [world.tick(0.5, temperature_c=celsius) for celsius in said]
     assert [reason(verdict) for verdict in verdicts] == ["hot"] * 4 + ["starting slowly"]
 
 
-def test_full_load_is_let_go_before_the_servo_would(world: ServoWorld):
+def test_full_load_is_let_go_before_the_servo_would(world):
     verdict = world.tick(0.0, load=0.0)
     while verdict.level != "hold":
         verdict = world.tick(0.08, stray=0.03, load=0.9)  # pushed by less than a stuck joint is
@@ -347,7 +433,7 @@ def test_full_load_is_let_go_before_the_servo_would(world: ServoWorld):
     assert reason(verdict) == "starting slowly" and world.t_s - full_s > 1.0
 
 
-def test_torque_off_holds_and_goes_along_with_the_joint(world: ServoWorld):
+def test_torque_off_holds_and_goes_along_with_the_joint(world):
     for k in range(100):  # turned by hand at 57 deg/s, then let go
         where = min(0.005 * k, 0.3)
         verdict = world.tick(-0.2, stray=where, torque=False)
@@ -359,7 +445,7 @@ def test_torque_off_holds_and_goes_along_with_the_joint(world: ServoWorld):
 
 
 @pytest.mark.parametrize("torque", [{"torque": False}, {}])
-def test_a_latched_fault_is_limp_with_its_words(world: ServoWorld, torque: dict[str, bool]):
+def test_a_latched_fault_is_limp_with_its_words(world, torque):
     for _ in range(80):
         verdict = world.tick(0.5, stray=0.1, fault="overload and input voltage", **torque)
         assert verdict.level == "torque_off"
@@ -376,9 +462,7 @@ def test_the_gravest_reasons_stand_by_themselves():
     assert ServoWorld().tick(0.0).critical_reasons == ()
 
 
-def test_what_still_moves_with_a_fault_moves_slowly_and_the_others_as_they_should(
-    world: ServoWorld,
-):
+def test_what_still_moves_with_a_fault_moves_slowly_and_the_others_as_they_should(world):
     for _ in range(100):
         verdict = world.tick(0.5, fault="input voltage", torque=True)
         assert verdict.level == "torque_off" and reason(verdict) == "input voltage"
@@ -408,7 +492,7 @@ def test_a_reset_begins_anew():
     assert at[-1] - 2.0 * at[-2] + at[-3] <= radians(300.0) * DT * DT + 1e-9
 
 
-def test_a_rearmed_joint_begins_where_it_is(world: ServoWorld):
+def test_a_rearmed_joint_begins_where_it_is(world):
     gentle = [reason(world.tick(0.0, rearmed=k == 0)) for k in range(250)]
     assert gentle.count("starting slowly") == pytest.approx(1.0 / DT, abs=1.1)
     for _ in range(40):
@@ -525,7 +609,7 @@ def test_one_joint_waits_at_its_wall_and_the_other_is_free():
 
 @pytest.mark.parametrize("pitch", [-29.9, -24.0, -18.1])
 @pytest.mark.parametrize("lid", [10.1, 17.0, 24.9])
-def test_who_begins_in_a_box_is_led_out_gently(pitch: float, lid: float):
+def test_who_begins_in_a_box_is_led_out_gently(pitch, lid):
     world = PairWorld(LID, neck_pitch=pitch, left_upper_lid=lid)
     verdict = world.tick(neck_pitch=pitch, left_upper_lid=lid)
     assert verdict.level == "hold"

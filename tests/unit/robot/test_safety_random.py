@@ -160,7 +160,7 @@ WISH_MOODS: tuple[Callable[[np.random.Generator, int], Array], ...] = (
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_random_wishes_never_leave_the_limits(seed: int):
+def test_random_wishes_never_leave_the_limits(seed):
     rng = np.random.default_rng([2024, seed])
     for _ in range(4):
         trial = Trial(RIGS[seed % 2], BOXES[seed // 2])
@@ -222,7 +222,7 @@ class Watched:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_every_command_keeps_the_limits_in_force(seed: int):
+def test_every_command_keeps_the_limits_in_force(seed):
     dice = np.random.default_rng(seed)
     watched = Watched(dice)
     for _ in range(60):
@@ -235,7 +235,7 @@ def test_every_command_keeps_the_limits_in_force(seed: int):
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_new_limits_come_into_force_and_every_joint_gets_inside(seed: int):
+def test_new_limits_come_into_force_and_every_joint_gets_inside(seed):
     dice = np.random.default_rng(seed)
     watched = Watched(dice)
     watched.wander(200)

@@ -4,7 +4,6 @@ from types import ModuleType
 
 import cv2
 import numpy as np
-import pytest
 
 from gazerig.drivers.camera.source import Shot
 from gazerig.drivers.vision.motion import clustering, detector
@@ -12,7 +11,7 @@ from gazerig.drivers.vision.motion.params import MotionParams
 from gazerig.robot.perception.motion_source import MotionSource
 
 
-def counted(monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str) -> list[object]:
+def counted(monkeypatch, module: ModuleType, name: str) -> list[object]:
     """Let a function of a module note each of its calls; return the list that grows."""
     calls: list[object] = []
     function = getattr(module, name)
@@ -25,9 +24,7 @@ def counted(monkeypatch: pytest.MonkeyPatch, module: ModuleType, name: str) -> l
     return calls
 
 
-def test_a_hundred_things_cost_no_more_than_may_be_reported(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_a_hundred_things_cost_no_more_than_may_be_reported(monkeypatch):
     measured = counted(monkeypatch, detector, "patch_motion")
     source, most = MotionSource(MotionParams(), None, 1.2, None), clustering.MOST_BLOBS
     grain = np.random.default_rng(0).standard_normal((2, 400, 700))
@@ -44,7 +41,7 @@ def test_a_hundred_things_cost_no_more_than_may_be_reported(
     assert 0 < len(measured) <= 3 * most, "three pairs of frames"
 
 
-def test_a_film_of_one_colour_holds_nothing(monkeypatch: pytest.MonkeyPatch):
+def test_a_film_of_one_colour_holds_nothing(monkeypatch):
     measured = counted(monkeypatch, detector, "patch_motion")
     source = MotionSource(MotionParams(), None, 1.2, None)
     for k, level in enumerate((90, 90, 93, 200)):

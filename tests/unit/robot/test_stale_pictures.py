@@ -116,7 +116,7 @@ def phases(rig: Rig, ticks: list[Tick]) -> tuple[float, float, float]:
 
 
 @RUNS
-def test_hold_then_search_then_rest(scene: Passer):
+def test_hold_then_search_then_rest(scene):
     rig, ticks = watched(scene)
     stale_s, search_s, over_s = phases(rig, ticks)
     assert over_s < BACK_S - 1.0
@@ -140,7 +140,7 @@ def test_hold_then_search_then_rest(scene: Passer):
 
 
 @RUNS
-def test_the_neck_does_not_move_on_a_stale_picture(scene: Passer):
+def test_the_neck_does_not_move_on_a_stale_picture(scene):
     """From the guard's age on it stands, whatever search and rest wish."""
     _, ticks = watched(scene)
     blind_s = last_picture_s(ticks) + FRAME_TIMEOUT_S

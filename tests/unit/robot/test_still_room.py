@@ -48,7 +48,7 @@ def watched(room: Room, patch: pytest.MonkeyPatch, seconds: float) -> list[Tick]
     return ticks
 
 
-def test_nothing_in_a_still_room_becomes_a_target(monkeypatch: pytest.MonkeyPatch):
+def test_nothing_in_a_still_room_becomes_a_target(monkeypatch):
     ticks = watched(Room(ball=False), monkeypatch, SECONDS)
     yaws = np.array([tick.pose.head_rad[0] for tick in ticks])
     rates = np.array([tick.pose.head_rate_rad_s[0] for tick in ticks])
@@ -58,7 +58,7 @@ def test_nothing_in_a_still_room_becomes_a_target(monkeypatch: pytest.MonkeyPatc
     assert {tick.target.kind for tick in ticks} <= {"rest", "glance", "search"}
 
 
-def test_what_moves_in_the_same_room_does(monkeypatch: pytest.MonkeyPatch):
+def test_what_moves_in_the_same_room_does(monkeypatch):
     """So the silence before is not that of a detector that finds nothing."""
     ticks = watched(Room(ball=True), monkeypatch, 1.5)
     assert "thing" in {tick.target.kind for tick in ticks}

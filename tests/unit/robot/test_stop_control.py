@@ -66,7 +66,7 @@ class Stops:
     ],
 )
 def test_who_stopped_alone_or_confirms_resumes_after_two_seconds(
-    stoppers: list[str], who: str, confirmed: bool, t_s: float, refused: str
+    stoppers, who, confirmed, t_s, refused
 ):
     stops = Stops(*stoppers)
     by = f" by {who}" if who else ""
@@ -97,7 +97,7 @@ def test_requests_within_a_second_are_refused_and_count_and_are_said_once():
 
 
 @pytest.mark.parametrize("error", [SetupError("x"), ServoFault("x"), BusLost("x")])
-def test_torque_that_cannot_be_switched_is_said(error: DriverError):
+def test_torque_that_cannot_be_switched_is_said(error):
     stops = Stops()
     stops.joints.error = error
     stops.control.halt(Stop("a hand"), 10.0)

@@ -15,7 +15,7 @@ pytestmark = pytest.mark.usefixtures("simulated_wires")
         ("gazerig ctl set a b", "gazerig ctl set a b"),
     ],
 )  # fmt: skip
-def test_a_suggestion_names_rig_and_port(said: str, wanted: str):
+def test_a_suggestion_names_rig_and_port(said, wanted):
     with clear_errors("my rig.yaml", "/dev/ttyACM3"):
         assert complete_suggestions(said) == wanted == complete_suggestions(wanted)
     assert complete_suggestions(said) == said

@@ -32,7 +32,7 @@ def _seen(mesh: TexturedMesh, uv: Floats) -> Floats:
 
 
 @pytest.mark.parametrize("shape", SHAPES)
-def test_every_corner_has_its_place_colour_and_normal(shape: str):
+def test_every_corner_has_its_place_colour_and_normal(shape):
     one = SHAPES[shape]()
     mesh = add_texture(one)
     assert mesh.uv.min() > 0.0 and mesh.uv.max() < 1.0

@@ -39,7 +39,7 @@ def walked(unseen_pictures: int, stops_after: int) -> TrackFilter:
 
 
 @pytest.mark.parametrize("unseen", [4, 6, 8])
-def test_who_stopped_while_out_of_sight_is_not_said_to_rush_back(unseen: int):
+def test_who_stopped_while_out_of_sight_is_not_said_to_rush_back(unseen):
     """The way it did not go is no sudden speed of the last picture alone."""
     track = walked(unseen, stops_after=1)
     assert abs(track.v_m_s[1]) < 1.8
@@ -206,7 +206,7 @@ LINES = rows(STEPS)
 
 
 @pytest.mark.parametrize("k", range(0, len(LINES), 3))
-def test_one_step(k: int):
+def test_one_step(k):
     actions, (quiet, *v), after = LINES[k], LINES[k + 1][:4], LINES[k + 1][4:] + LINES[k + 2]
     one = TrackFilter((2.0, 0.0, 0.0), ORIGIN, (0.1, 0.5), 2.0, ProcessNoise(quiet, 10.0))
     assert (one.view, one.range_m, one.v_m_s) == ((1.0, 0.0, 0.0), 2.0, ORIGIN)

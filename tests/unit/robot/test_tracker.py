@@ -23,7 +23,7 @@ def tracker() -> Tracker:
     return Tracker()
 
 
-def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity(tracker: Tracker):
+def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity(tracker):
     (seen,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
     assert [track.id for track in tracker.step([], CAMERA, 0.1)] == [seen.id]
     assert tracker.step([], CAMERA, 0.6) == ()
@@ -34,7 +34,7 @@ def test_a_missed_picture_coasts_and_a_short_absence_keeps_the_identity(tracker:
     ("y", "after_s", "same"), [(0.05, 10.0, True), (0.5, 10.0, False), (0.05, 25.0, False)]
 )
 def test_a_face_that_stays_where_it_was_is_known_again_after_long(
-    tracker: Tracker, monkeypatch: pytest.MonkeyPatch, y: float, after_s: float, same: bool
+    tracker, monkeypatch, y, after_s, same
 ):
     monkeypatch.setattr("gazerig.robot.perception.tracker._REMEMBER_PERSON_S", 0.0)
     for k in range(10):
@@ -44,13 +44,13 @@ def test_a_face_that_stays_where_it_was_is_known_again_after_long(
     assert (tracker.step([face(1.0, y)], CAMERA, after_s)[0].id == seen.id) is same
 
 
-def test_a_thing_out_of_sight_is_not_remembered(tracker: Tracker):
+def test_a_thing_out_of_sight_is_not_remembered(tracker):
     (hand,) = tracker.step([face(1.0, 0.0, "hand")], CAMERA, 0.0)
     assert tracker.step([], CAMERA, 3.0) == ()
     assert tracker.step([face(1.0, 0.0, "hand")], CAMERA, 3.1)[0].id != hand.id
 
 
-def test_far_apart_is_somebody_else_and_kinds_never_mix(tracker: Tracker):
+def test_far_apart_is_somebody_else_and_kinds_never_mix(tracker):
     (one,) = tracker.step([face(1.0, 0.0)], CAMERA, 0.0)
     after = tracker.step([face(1.0, 0.6), face(1.0, 0.01, "hand")], CAMERA, 0.033)
     assert {track.detection.kind for track in after if track.id != one.id} == {"face", "hand"}
@@ -69,7 +69,7 @@ def across(y: float, x: float = 1.5, kind: str = "face") -> Located:
     )
 
 
-def test_an_identity_survives_a_second_behind_something(tracker: Tracker):
+def test_an_identity_survives_a_second_behind_something(tracker):
     for k in range(30):
         (seen,) = tracker.step([across(0.4 * k / 30)], CAMERA, k / 30)
     for k in range(30, 60):
@@ -79,7 +79,7 @@ def test_an_identity_survives_a_second_behind_something(tracker: Tracker):
 
 
 @pytest.mark.parametrize("apart_m", [0.0, 0.1, 0.4])
-def test_people_who_cross_keep_their_identities(apart_m: float):
+def test_people_who_cross_keep_their_identities(apart_m):
     """Two walk past each other at 1 m/s each; while one hides the other, one face is found."""
     rng, tracker = np.random.default_rng(3), Tracker()
     first: dict[str, int] = {}
@@ -95,7 +95,7 @@ def test_people_who_cross_keep_their_identities(apart_m: float):
     assert {"left": min(tracks, key=_y).id, "right": max(tracks, key=_y).id} == first
 
 
-def test_who_is_hidden_is_not_whoever_appears_nearby(tracker: Tracker):
+def test_who_is_hidden_is_not_whoever_appears_nearby(tracker):
     """A man walks behind a woman; a third person appears half a metre from them."""
     near, far = across(0.0, 1.0), across(0.02, 2.0)
     for k in range(30):
@@ -110,7 +110,7 @@ def test_who_is_hidden_is_not_whoever_appears_nearby(tracker: Tracker):
     assert moved.id == alone.id
 
 
-def test_what_the_detector_follows_stays_itself_beside_something_nearer(tracker: Tracker):
+def test_what_the_detector_follows_stays_itself_beside_something_nearer(tracker):
     """A patch whose middle jumps by half a metre keeps the number that the detector gave it."""
     near, far = across(0.0, 1.9, "thing"), across(0.05, 2.0, "thing")
     near, far = near._replace(detector_id=1), far._replace(detector_id=2)
@@ -125,7 +125,7 @@ def _y(track: BodyTrack) -> float:
     return track.p_world_m[1]
 
 
-def test_a_distance_known_badly_is_no_reason_to_be_somebody_else(tracker: Tracker):
+def test_a_distance_known_badly_is_no_reason_to_be_somebody_else(tracker):
     (one,) = tracker.step([across(0.0, 3.0)], CAMERA, 0.0)
     (same,) = tracker.step([across(0.0, 3.4)], CAMERA, 0.033)
     assert same.id == one.id
@@ -151,7 +151,7 @@ def test_a_sudden_step_is_followed_at_once_and_standing_stays_smooth():
     assert max(lag) < 0.02
 
 
-def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes(tracker: Tracker):
+def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes(tracker):
     """A child's face looks 20 % farther than it is; through a hole it stays where it is."""
     by_depth = across(0.0, 1.0)._replace(depth_measured=True, along_sd_m=0.01, size_depth=1.25)
     for k in range(20):
@@ -176,9 +176,7 @@ def test_the_size_of_a_face_is_learned_from_depth_and_used_in_its_holes(tracker:
     ),
     st.floats(0.001, 0.5),
 )
-def test_nothing_makes_it_give_what_is_no_number(
-    pictures: list[list[tuple[float, float, str]]], dt_s: float
-):
+def test_nothing_makes_it_give_what_is_no_number(pictures, dt_s):
     tracker, t_s = Tracker(), 0.0
     for picture in pictures:
         t_s += dt_s
@@ -197,9 +195,7 @@ def dressed(found: Located, *bins: int) -> Located:
 
 
 @pytest.mark.parametrize(("worn", "same"), [(3, True), (7, False)])
-def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(
-    tracker: Tracker, worn: int, same: bool
-):
+def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(tracker, worn, same):
     for k in range(15):
         (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
     tracker.step([], CAMERA, 6.0)
@@ -207,7 +203,7 @@ def test_who_returns_elsewhere_in_the_same_clothes_is_known_again(
     assert (back.id == gone.id) is same
 
 
-def test_who_returns_after_the_time_of_memory_is_somebody_new(tracker: Tracker):
+def test_who_returns_after_the_time_of_memory_is_somebody_new(tracker):
     for k in range(15):
         (gone,) = tracker.step([dressed(across(0.5, 2.0), 3)], CAMERA, k / 30)
     tracker.step([], CAMERA, 30.0)
@@ -227,27 +223,27 @@ def visit(tracker: Tracker, start_s: float, *found: Located) -> list[int]:
     return shown
 
 
-def test_people_and_things_count_separately(tracker: Tracker):
+def test_people_and_things_count_separately(tracker):
     found = [across(0.5, kind="thing"), across(-0.5), across(0.0, kind="hand")]
     ids = [track.id for track in tracker.step(found, CAMERA, 0.0)]
     assert ids == [FIRST_THING, 1, FIRST_THING + 1]
     assert [body_name("hand", i) for i in ids] == ["hand 1", "hand 1", "hand 2"]
 
 
-def test_a_person_who_comes_back_at_the_other_side_keeps_the_number(tracker: Tracker):
+def test_a_person_who_comes_back_at_the_other_side_keeps_the_number(tracker):
     assert {*visit(tracker, 0.0, *[across(0.5)] * 15)} == {1}
     assert {*visit(tracker, 40.0, *[across(-0.9)] * 15)} == {1}
     taller = across(0.5)._replace(p_m=(1.5, 0.5, 0.6))
     assert {*visit(tracker, 80.0, *[taller] * 15)} == {2}
 
 
-def test_nobody_is_faster_than_a_walker(tracker: Tracker):
+def test_nobody_is_faster_than_a_walker(tracker):
     visit(tracker, 0.0, *[across(0.0, 3.0)] * 15)
     far = across(0.0)._replace(p_m=(1.5, 20.0, 0.2))
     assert {*visit(tracker, 4.0, *[far] * 15)} == {2}
 
 
-def test_clothes_that_are_seen_later_settle_the_number(tracker: Tracker):
+def test_clothes_that_are_seen_later_settle_the_number(tracker):
     visit(tracker, 0.0, *[dressed(across(0.5), 3)] * 15)
     stranger = visit(tracker, 30.0, across(0.4), *[dressed(across(0.4), 7)] * 15)
     assert stranger[0] == 1 and stranger[-1] == 2
@@ -256,7 +252,7 @@ def test_clothes_that_are_seen_later_settle_the_number(tracker: Tracker):
     assert known[0] != 1 and known[-1] == 1
 
 
-def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker: Tracker):
+def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker):
     for k in range(12):
         up = across(0.0, 2.0)._replace(p_m=(2.0, 0.2 * k, 0.2 + 0.03 * k))
         (one,) = tracker.step([up], CAMERA, k / 30)
@@ -267,7 +263,7 @@ def test_who_is_hidden_stays_as_high_and_goes_no_faster_than_people(tracker: Tra
     assert one.p_world_m[2] == pytest.approx(before, abs=0.05)
 
 
-def test_a_thing_that_turns_out_to_be_a_hand_keeps_its_identity(tracker: Tracker):
+def test_a_thing_that_turns_out_to_be_a_hand_keeps_its_identity(tracker):
     moving = face(2.0, 0.9, "thing")._replace(detector_id=7)
     (thing,) = tracker.step([moving], CAMERA, 0.0)
     hand = moving._replace(kind="hand", p_m=(0.6, 0.27, 0.2))

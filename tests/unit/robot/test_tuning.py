@@ -38,7 +38,7 @@ class Bench:
 
 
 @pytest.fixture
-def mine(tmp_path: Path) -> Path:
+def mine(tmp_path) -> Path:
     path = tmp_path / "mine.yaml"
     path.write_text(DESK.read_text(encoding="utf-8"), encoding="utf-8")
     return path
@@ -62,7 +62,7 @@ def test_one_wrong_value_refuses_all_with_every_rule():
 
 
 @pytest.mark.parametrize("text", ["loop:\n  rate_hz: fast\n", "name: [\n", "", None])
-def test_a_file_spoilt_by_hand_is_not_touched(mine: Path, text: str | None):
+def test_a_file_spoilt_by_hand_is_not_touched(mine, text):
     bench = Bench(str(mine))
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
     before = mine.read_text(encoding="utf-8")
@@ -75,7 +75,7 @@ def test_a_file_spoilt_by_hand_is_not_touched(mine: Path, text: str | None):
     assert load_rig(str(mine)).gaze.lids.close_ms == 90.0 and bench.tuning.unsaved() == ()
 
 
-def test_a_good_edit_that_nobody_has_heard_of_is_in_force_when_saved(mine: Path):
+def test_a_good_edit_that_nobody_has_heard_of_is_in_force_when_saved(mine):
     bench = Bench(str(mine))
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
     text = mine.read_text(encoding="utf-8")
@@ -86,7 +86,7 @@ def test_a_good_edit_that_nobody_has_heard_of_is_in_force_when_saved(mine: Path)
     assert rig.gaze == bench.made.rig.gaze and bench.made.loop.rate_hz == 200.0
 
 
-def test_a_shipped_rig_asks_for_a_path_and_goes_on_from_it(tmp_path: Path):
+def test_a_shipped_rig_asks_for_a_path_and_goes_on_from_it(tmp_path):
     bench = Bench("desk")
     bench.tuning.set({"gaze.lids.close_ms": 90.0})
     with pytest.raises(ConfigError, match="is part of the program"):
@@ -124,7 +124,7 @@ def test_characters_are_switched_and_what_is_unsaved_stays_over_them():
 
 @pytest.mark.parametrize("copied", [False, True])
 def test_a_character_is_saved_by_its_name_and_of_the_values_only_those_set_by_hand(
-    mine: Path, tmp_path: Path, copied: bool
+    mine, tmp_path, copied
 ):
     bench = Bench(str(mine))
     bench.tuning.set({"character": "bold"})
@@ -148,7 +148,7 @@ def test_a_character_is_saved_by_its_name_and_of_the_values_only_those_set_by_ha
     }
 
 
-def test_options_of_the_command_line_stay_and_are_never_saved(mine: Path):
+def test_options_of_the_command_line_stay_and_are_never_saved(mine):
     bench = Bench(str(mine), scanpath="random")
     assert bench.tuning.unsaved() == ()
     bench.tuning.set({"character": "bold"})

@@ -35,7 +35,7 @@ def speech(seconds: float) -> bytes:
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(tmp_path_factory) -> Path:
     """Return a folder with an expressive rig whose sounds are silent, and three sounds."""
     folder = tmp_path_factory.mktemp("voice")
     text = SHIPPED.read_text("utf-8").replace(
@@ -87,7 +87,7 @@ def opened(folder: Path, ticks: Ticks | None = None, **given: Any) -> Any:
 
 
 @pytest.mark.parametrize("what", ["file", "stream", pytest.param("text", marks=needs_espeak)])
-def test_the_jaw_follows_the_speech_and_is_shut_at_its_end(folder: Path, what: str):
+def test_the_jaw_follows_the_speech_and_is_shut_at_its_end(folder, what):
     ticks = Ticks()
     with opened(folder, ticks, fast=True) as head:
         if what == "stream":
@@ -108,7 +108,7 @@ def test_the_jaw_follows_the_speech_and_is_shut_at_its_end(folder: Path, what: s
             assert 4 <= shut <= 7  # once in each of six syllables
 
 
-def test_the_lips_close_on_the_phonemes_of_a_text(folder: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_lips_close_on_the_phonemes_of_a_text(folder, monkeypatch):
     t_s = np.arange(2 * RATE) / RATE
     pcm = (12000 * np.sin(2 * np.pi * 1000 * t_s)).astype("<i2").tobytes()
     phonemes = [("m", 0.3), ("a", 0.4), ("b", 0.8), ("a", 0.9), ("p", 1.4), ("a", 1.42)]
@@ -124,7 +124,7 @@ def test_the_lips_close_on_the_phonemes_of_a_text(folder: Path, monkeypatch: pyt
         assert np.interp(middle_s + silent_s - 0.12, times, jaw) > 0.8 * JAW_DEG
 
 
-def test_what_cannot_be_said_is_refused_with_one_message(folder: Path):
+def test_what_cannot_be_said_is_refused_with_one_message(folder):
     (folder / "rig.wav").write_bytes(b"no sound")
     with opened(folder, fast=True) as head:
         for what, message in (
@@ -136,7 +136,7 @@ def test_what_cannot_be_said_is_refused_with_one_message(folder: Path):
                 head.say(what)
 
 
-def test_clients_of_the_network_may_name_sounds_of_the_folders_only(folder: Path, tmp_path: Path):
+def test_clients_of_the_network_may_name_sounds_of_the_folders_only(folder, tmp_path):
     write_wav(tmp_path / "secret.wav", speech(0.5), RATE)
     with opened(folder, fast=True) as head:
         voice = head._made.voice
@@ -177,7 +177,7 @@ def is_silent(head: Any) -> bool:
     return sound_s(head) == first
 
 
-def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder: Path):
+def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder):
     with opened(folder) as head:
         head.say("long.wav")
         wait_for(lambda: (sound_s(head) or 0.0) > 0.1)
@@ -193,9 +193,7 @@ def test_sound_and_track_have_one_clock_and_every_end_silences_the_sound(folder:
         os.kill(pid, 0)
 
 
-def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(
-    speaker: Any, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(speaker, monkeypatch):
     head, voice = speaker, speaker._made.voice
     abandoned_s = "gazerig.robot.run.voice._ABANDONED_S"
     monkeypatch.setattr(abandoned_s, 600.0)
@@ -216,7 +214,7 @@ def test_a_stream_moves_the_mouth_and_a_stall_shuts_it(
     head.release_joints()
 
 
-def test_a_stream_without_volume_moves_the_mouth_and_needs_no_loudspeaker(folder: Path):
+def test_a_stream_without_volume_moves_the_mouth_and_needs_no_loudspeaker(folder):
     text, rig = (folder / "rig.yaml").read_text("utf-8"), folder / "elsewhere.yaml"
     rig.write_text(text.replace("device: silent", "device: none such"), "utf-8")
     with gazerig.open(str(rig), mock=True, bus="ideal", say=lambda line: None) as head:
@@ -232,7 +230,7 @@ def test_a_stream_without_volume_moves_the_mouth_and_needs_no_loudspeaker(folder
         wait_for(lambda: not is_playing(head))
 
 
-def test_other_programs_say_files_and_streams(speaker: Any):
+def test_other_programs_say_files_and_streams(speaker):
     async def say(pid: int) -> str:
         async with gazerig.aio.connect(pid) as head:
             return await head.say("word.wav")
@@ -249,7 +247,7 @@ def test_other_programs_say_files_and_streams(speaker: Any):
     assert asyncio.run(say(os.getpid())) == "arrived"
 
 
-def test_the_sound_of_a_track_file_begins_and_ends_with_it(speaker: Any):
+def test_the_sound_of_a_track_file_begins_and_ends_with_it(speaker):
     head = speaker
     assert head.play("show").reply.track.duration_s >= 59.9
     wait_for(lambda: (sound_s(head) or 0.0) > 0.1)

@@ -70,7 +70,7 @@ def test_options_that_make_no_sense_are_refused_in_one_line(words, said):
 
 
 @pytest.fixture
-def recorded(tmp_path: Path) -> Path:
+def recorded(tmp_path) -> Path:
     file = tmp_path / "run.mcap"
     options = RunOptions(mock=True, fast=True, bus="ideal", seed=3, seconds=3.0, record=file)
     options = options.check_and_complete()

@@ -97,7 +97,7 @@ def mtcnn() -> MtcnnDetector:
 
 
 @pytest.mark.parametrize("turn_deg", [-25.0, 0.0, 20.0])
-def test_a_real_detector_finds_drawn_faces_where_they_are(mtcnn: MtcnnDetector, turn_deg: float):
+def test_a_real_detector_finds_drawn_faces_where_they_are(mtcnn, turn_deg):
     """At eight distances: landmarks within a part of the distance between the eyes."""
     errors, directions, noise = [], [], np.random.default_rng(0)
     view = seen_from()
@@ -124,7 +124,7 @@ def test_a_real_detector_finds_drawn_faces_where_they_are(mtcnn: MtcnnDetector, 
 
 
 @pytest.mark.parametrize("name", shipped_names("scenes"))
-def test_every_scene_can_be_sent_and_drawn(name: str):
+def test_every_scene_can_be_sent_and_drawn(name):
     scene = DrawnScene(load_scene(name))
     sent = pickle.loads(pickle.dumps(scene))
     for t_s in (0.0, 17.9):

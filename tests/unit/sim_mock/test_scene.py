@@ -35,7 +35,7 @@ def times(scene: Scene) -> list[float]:
 
 
 @pytest.mark.parametrize("name", shipped_names("scenes"))
-def test_nobody_jumps_and_no_thing_is_faster_than_a_fist(name: str):
+def test_nobody_jumps_and_no_thing_is_faster_than_a_fist(name):
     scene = load_scene(name)
     before_people, before = scene.people(0.0), {t.id: t for t in scene.things(0.0)}
     for t_s in times(scene)[1:]:
@@ -59,9 +59,7 @@ def test_nobody_jumps_and_no_thing_is_faster_than_a_fist(name: str):
         ("      []\nthings: {a: {kind: hand, at: moon}}\n", 11, "no place 'moon'"),
     ],
 )  # fmt: skip
-def test_a_script_that_cannot_be_played_is_refused_at_its_line(
-    tmp_path: Path, acts: str, line: int, rule: str
-):
+def test_a_script_that_cannot_be_played_is_refused_at_its_line(tmp_path, acts, line, rule):
     file = tmp_path / "own.yaml"
     file.write_text(SCRIPT + acts)
     with pytest.raises(ConfigError) as caught:
@@ -69,7 +67,7 @@ def test_a_script_that_cannot_be_played_is_refused_at_its_line(
     assert f"own.yaml:{line}:" in str(caught.value) and rule in str(caught.value)
 
 
-def test_a_script_of_ones_own_is_played_and_its_seed_varies_it(tmp_path: Path):
+def test_a_script_of_ones_own_is_played_and_its_seed_varies_it(tmp_path):
     file = tmp_path / "own.yaml"
     walks = "- {at_s: 5, do: walk, to: there, vary_s: 2}\n      - {at_s: 12, do: walk, to: here}"
     file.write_text(f"{SCRIPT}      {walks}\n")
@@ -98,7 +96,7 @@ def played(name: str) -> str:
 
 
 @pytest.mark.parametrize("name", shipped_names("scenes"))
-def test_a_scene_is_as_it_was_reviewed(name: str):
+def test_a_scene_is_as_it_was_reviewed(name):
     assert played(name) in SCENES.read_text(encoding="utf-8")
 
 

@@ -51,7 +51,7 @@ def seen_at(made: SceneCamera, t_s: float) -> Detections:
 
 
 @pytest.mark.parametrize("name", ["boxing", "three-people", "table"])
-def test_every_detection_is_as_it_was_reviewed(name: str):
+def test_every_detection_is_as_it_was_reviewed(name):
     rows, made = [], camera(load_scene(name))
     for now_s in np.arange(0.0, 30.0, 0.7).tolist():
         if found := made.latest(now_s):
@@ -77,9 +77,7 @@ def test_a_thing_is_seen_late_and_only_inside_the_field():
 @pytest.mark.parametrize(
     ("aside_deg", "radius_m", "seen"), [(37.0, 0.07, 1), (37.0, 0.02, 0), (39.0, 0.07, 0)]
 )
-def test_a_hand_is_seen_while_a_part_of_it_is_in_the_picture(
-    aside_deg: float, radius_m: float, seen: int
-):
+def test_a_hand_is_seen_while_a_part_of_it_is_in_the_picture(aside_deg, radius_m, seen):
     aside = Thing(0, "hand", (0.5, 0.5 * np.tan(np.radians(aside_deg)), 0.0), radius_m)
     made = camera(Still((aside,)), horizontal_field_deg=69.0)
     assert len(seen_at(made, 0.2).blobs) == 1 + seen  # and the person's own hand
