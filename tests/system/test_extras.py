@@ -41,7 +41,8 @@ def python(code: str, folder: Path, **variables: str) -> tuple[str, str]:
     """Run code in a process of its own; return what it wrote to its standard output and error."""
     done = subprocess.run(
         [sys.executable, "-c", code],
-        capture_output=True, text=True, cwd=folder, env={**os.environ, **variables},
+        capture_output=True, text=True, cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **variables},
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     return done.stdout, done.stderr
