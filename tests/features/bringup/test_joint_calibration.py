@@ -211,6 +211,7 @@ def test_by_hand_over_the_seam_the_middle_of_a_feetech_servo_can_be_set():
     bench = Bench(STS, 3900)
     way = ["600", "-1200", "600"]
     bench.script = way.copy()
+    bench.put("torque_enable", 1)
     with pytest.raises(CalibrationRefused, match=r"crosses the servo's seam .* --set-middle"):
         calibrate_by_hand(bench.joint, bench, 2.0)
     offset = bench.joint.set_middle()

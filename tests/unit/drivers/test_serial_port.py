@@ -55,9 +55,11 @@ def test_drain_empties_the_line(line):
 
 def test_a_line_that_takes_nothing_is_a_lost_bus(line):
     _, port = line
+    began_s = port.now_s()
     with pytest.raises(BusLost, match="accepts no more bytes"):
         for _ in range(1000):
             port.write(b"x" * 1024)
+    assert port.now_s() - began_s >= 0.05
 
 
 def test_a_hang_up_is_a_lost_bus(line):

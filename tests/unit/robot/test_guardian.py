@@ -213,6 +213,9 @@ def test_a_joint_far_outside_its_range_gets_no_torque_again():
         "torque could not be switched on again: jaw (servo 2) is at step 3500, far"
     )
     sts.command("turn 2 -1500")
+    sts.command("lose 3 for 1.5")
+    sts.run(RETRY_S + 0.1, [2000] * 4)
+    assert "no position from neck (servo 3)" in str(sts.bus.events())
     sts.run(RETRY_S + 0.1, [2000] * 4)
     assert all(sts.get(i, TORQUE_ENABLE) for i in (1, 2, 3, 4))
 
