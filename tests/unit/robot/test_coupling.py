@@ -18,6 +18,7 @@ from gazerig.robot.loop.body import CoupledServos
 from gazerig.robot.model.commands import Jog
 from gazerig.robot.model.coupling import CouplingParams
 from gazerig.robot.model.weight import HeadMassParams, MassParams
+from gazerig.robot.run.rig_limits import servo_configs
 
 PITCH, ROLL = 35.0, 25.0
 COUPLING = CouplingParams("neck_pitch", "neck_roll", 1.5, 1.2)
@@ -40,6 +41,20 @@ def rig_with(coupling: CouplingParams) -> Rig:
 def test_a_range_that_the_servos_cannot_do_is_refused_with_its_corner(coupling, said):
     (fault,) = faults(rig_with(coupling))
     assert fault.startswith("couplings.neck") and said in fault
+
+
+def test_servos_get_the_limits_that_the_whole_range_needs():
+    rig = rig_with(COUPLING)
+    setups = dict(zip(rig.names, servo_configs(rig), strict=True))
+    corners = [
+        COUPLING.servo_rad((radians(pitch), radians(roll)))
+        for pitch in (-PITCH, 0.0, PITCH)
+        for roll in (-ROLL, 0.0, ROLL)
+    ]
+    for name, angles in zip(COUPLING.joints, zip(*corners, strict=True), strict=True):
+        steps = [*map(rig.joints[name].steps, angles)]
+        needed = pytest.approx((min(steps), max(steps)), abs=2.0)
+        assert (setups[name].min_steps, setups[name].max_steps) == needed
 
 
 def test_a_coupling_of_a_joint_with_itself_is_refused():
