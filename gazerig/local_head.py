@@ -178,13 +178,12 @@ class RunningHead(LocalHead):
                 lambda line: lines.add(partial(self._say, line)),
                 watch=self._update,
             )
-            figures = session.run()
-            lines.wait_idle(_LINES_S)
-            ended = str(figures["stopped_by"])
+            ended = str(session.run()["stopped_by"])
         except BaseException as error:
             self._failure = error
             ended = f"fault: {error}"
         finally:
+            lines.wait_idle(_LINES_S)
             self._ended = ended
             self._finished.set()
             # Otherwise a worker that does not look at the head would keep the program from ending.

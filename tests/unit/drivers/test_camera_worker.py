@@ -272,7 +272,7 @@ def test_a_process_that_ends_or_hangs_is_told_of_and_started_again(end, care, re
     wait_for(lambda: present(camera.latest(0.0)).number > before.number + 20)
     after = present(camera.latest(0.0))
     assert after.captured_s > before.captured_s + 0.2 and after.image is not None
-    lost, back = camera.events()
+    lost, back, *_ = camera.events()  # on a busy computer it may be lost again
     assert lost == reported and back.startswith("camera back after")
     assert pid_of(camera) != first
     camera.close()
