@@ -196,20 +196,18 @@ def devices(monkeypatch: pytest.MonkeyPatch) -> "list[Device]":
     return made
 
 
-def shipped_rig(name: str) -> "Rig":
-    from gazerig.config.schema import load_rig
-
-    return load_rig(name)
-
-
 @pytest.fixture(scope="session")
 def desk_rig() -> "Rig":
-    return shipped_rig("desk")
+    from gazerig.config.schema import load_rig
+
+    return load_rig("desk")
 
 
 @pytest.fixture(scope="session")
 def maker_rig() -> "Rig":
-    return shipped_rig("maker")
+    from gazerig.config.schema import load_rig
+
+    return load_rig("maker")
 
 
 @pytest.fixture(scope="session")

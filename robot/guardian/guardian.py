@@ -73,11 +73,6 @@ class Guardian:
     def __del__(self) -> None:
         os.close(self._fd)
 
-    @property
-    def pid(self) -> int | None:
-        """Return the process id of the guardian, None if it does not run."""
-        return None if self._process is None else self._process.pid
-
     def beat(self) -> None:
         """Count one heartbeat; only the control loop's thread may call it."""
         self._beat_s = self._clock.now_s()

@@ -230,6 +230,11 @@ class Wire:
         dropped, self._rest = self._rest[:end], self._rest[end:]
         return dropped.count(b"\n")
 
+    def stop_reading(self) -> None:
+        """Have readers of this end get its end; writers can go on."""
+        with contextlib.suppress(OSError):  # the other end has closed
+            self._end.shutdown(socket.SHUT_RD)
+
     def close(self) -> None:
         """Close the connection; readers at both ends get its end."""
         shut(self._end)

@@ -147,7 +147,7 @@ class RemoteServer:
         self._admit(end, "")
 
     def close(self) -> None:
-        """Close all connections and remove the socket."""
+        """Send the last answers, close all connections and remove the socket."""
         if self.path is not None:
             self.path.unlink(missing_ok=True)
         with self._lock:
@@ -155,9 +155,8 @@ class RemoteServer:
             if self._listener is not None:
                 socket_io.shut(self._listener)
             for wire in self._wires:
-                wire.close()
-            threads = tuple(self._threads)
-        for thread in threads:
+                wire.stop_reading()
+        for thread in self._threads:  # no more are started; each ends its connection
             thread.join(timeout=2.0)
 
     def _start(self, work: Callable[..., None], *words: object) -> bool:
@@ -256,6 +255,8 @@ class RemoteServer:
         try:
             while (waiting := program.waiting.get()) is not None:
                 answer = waiting.answer
+                if answer is None and self._over:
+                    continue
                 if answer is None and (refused := self._delay(own) or program.refusal(waiting)):
                     tag = waiting.request.get("tag") if isinstance(waiting.request, dict) else None
                     answer = {"refused": refused} | ({"tag": tag} if tag is not None else {})

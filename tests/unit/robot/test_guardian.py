@@ -7,6 +7,7 @@ import sys
 from unittest.mock import Mock
 
 import pytest
+from child_processes import running_as
 from feedback_rows import rows
 from loop_deaths import PATIENCE_S, driven
 from mixed_rig import mixed_rig
@@ -240,11 +241,12 @@ def test_it_ends_silently_when_all_is_off(capfd):
     guardian = Guardian((PLAN,))
     guardian.join(0)
     guardian.arm(0)
-    pid = guardian.pid
+    own = os.getpid(), "gazerig.robot.guardian.process"
+    assert running_as(*own)
     guardian.disarm(0)
     guardian.leave(0)
     guardian.leave(0)
-    assert guardian.pid is None and not os.path.exists(f"/proc/{pid}")
+    assert not running_as(*own)
     assert capfd.readouterr().err == ""
 
 
